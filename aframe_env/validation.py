@@ -1,0 +1,58 @@
+"""Checks of user input: one clear error that names the value, the allowed range and the unit."""
+
+from __future__ import annotations
+
+import math
+from numbers import Real
+from typing import Any
+
+
+class InvalidValue(ValueError):
+    """A value outside what the model can take. The message names it, its range and its unit."""
+
+
+def _interval(low: float, high: float, low_open: bool) -> str:
+    left = "(" if low_open or math.isinf(low) else "["
+    right = ")" if math.isinf(high) else "]"
+    return f"{left}{low:g}, {high:g}{right}"
+
+
+def require_number(
+    name: str,
+    value: Any,
+    unit: str,
+    *,
+    low: float = -math.inf,
+    high: float = math.inf,
+    low_open: bool = False,
+) -> None:
+    """Raise unless ``value`` is a finite real number in [low, high] (or (low, high])."""
+    allowed = f"{_interval(low, high, low_open)} {unit}".rstrip()
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise InvalidValue(f"{name} = {value!r}: must be a number in {allowed}")
+    number = float(value)
+    below = number <= low if low_open else number < low
+    if not math.isfinite(number) or below or number > high:
+        raise InvalidValue(f"{name} = {value!r} {unit}".rstrip() + f": must be in {allowed}")
+
+
+def require_integer(name: str, value: Any, *, low: int, high: int) -> None:
+    """Raise unless ``value`` is an integer in [low, high]."""
+    if isinstance(value, bool) or not hasattr(value, "__index__"):
+        raise InvalidValue(f"{name} = {value!r}: must be an integer in [{low}, {high}]")
+    if not low <= int(value) <= high:
+        raise InvalidValue(f"{name} = {value!r}: must be in [{low}, {high}]")
+
+
+def require_vector(name: str, value: Any, unit: str, size: int = 3) -> None:
+    """Raise unless ``value`` is a sequence of ``size`` finite numbers."""
+    if not hasattr(value, "__len__") or len(value) != size:
+        raise InvalidValue(f"{name} = {value!r}: must be {size} numbers in {unit}")
+    for index, item in enumerate(value):
+        require_number(f"{name}[{index}]", item, unit)
+
+
+def require_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:
+    """Raise unless ``value`` is one of ``choices``."""
+    if value not in choices:
+        raise InvalidValue(f"{name} = {value!r}: must be one of {', '.join(map(repr, choices))}")
