@@ -1,0 +1,45 @@
+"""How the physics is compiled: decorators for scalar functions and kernels, and a cache that is never stale."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+from numba import njit
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+# No fastmath: a row must give the same bits in a batch, alone, and in any block. Division follows IEEE 754,
+# since a check for zero in the inner loop would keep it from being vectorised.
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "boundscheck": False, "nogil": True}
+
+
+def scalar(function: F) -> F:
+    """Compile a function of plain floats that is inlined wherever it is called."""
+    return cast(F, njit(forceinline=True, **_OPTIONS)(function))
+
+
+def kernel(function: F) -> F:
+    """Compile a loop over rows, cached on disk."""
+    return cast(F, njit(cache=True, **_OPTIONS)(function))
+
+
+def parallel_kernel(function: F) -> F:
+    """Compile a loop over rows that spreads over the cores, cached on disk."""
+    return cast(F, njit(cache=True, parallel=True, **_OPTIONS)(function))
+
+
+@cache
+def source_digest() -> str:
+    """Digest of the physics' sources.
+
+    numba invalidates a cached kernel when the kernel's own file changes, not when a function that it calls does.
+    A kernel that closes over this digest is compiled anew after any change.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()

@@ -1,0 +1,107 @@
+"""Where each quantity of a row lies: the slots of the engine's array.
+
+The engine's array has shape (blocks, slots(components) * lanes): rows in blocks, each quantity contiguous over a
+block's lanes. An index `slot * lanes + lane` with constant slot and lanes shows the compiler that no two
+quantities overlap, and so it vectorises the loop over lanes. All float64, SI.
+"""
+
+from __future__ import annotations
+
+from itertools import count
+from typing import Final
+
+LANES: Final = 64
+"""Rows in a block."""
+
+_next = count().__next__
+
+
+def _take(size: int) -> int:
+    first = _next()
+    for _ in range(size - 1):
+        _next()
+    return first
+
+
+# State.
+TIME: Final = _take(1)
+LOAD_POSITION: Final = _take(3)
+LOAD_VELOCITY: Final = _take(3)
+DRUM_ANGLE: Final = _take(1)
+DRUM_SPEED: Final = _take(1)
+COMMAND: Final = _take(1)
+MOTION: Final = _take(18)
+"""Deck: six coordinates (surge, sway, heave, roll, pitch, yaw), their rates, their accelerations."""
+PULLEY: Final = _take(9)
+"""Pulley S in the base frame: position, velocity, acceleration."""
+OMEGA1: Final = _take(1)
+OMEGA2: Final = _take(1)
+STEP_COST: Final = _take(1)
+"""Integral of (x_L3 - h)² over the last control step."""
+TENSION: Final = _take(1)
+PEAK_TENSION: Final = _take(1)
+"""Greatest tension within the last control step."""
+SLACK: Final = _take(1)
+"""1 where the rope was slack within the last control step."""
+PARTED: Final = _take(1)
+"""1 from the moment at which the tension passed the breaking load."""
+
+# Parameters.
+MASS: Final = _take(1)
+GRAVITY: Final = _take(1)
+TARGET: Final = _take(1)
+AXIAL_STIFFNESS: Final = _take(1)
+ROPE_DAMPING: Final = _take(1)
+BREAKING_LOAD: Final = _take(1)
+FREE_LENGTH: Final = _take(1)
+"""l_0: unstretched length between drum and load at drum angle 0."""
+DRUM_TO_PULLEY: Final = _take(1)
+DRUM_RADIUS: Final = _take(1)
+MAX_SPEED: Final = _take(1)
+MAX_ACCELERATION: Final = _take(1)
+LAG: Final = _take(1)
+MIN_ANGLE: Final = _take(1)
+MAX_ANGLE: Final = _take(1)
+PULLEY_ON_DECK: Final = _take(3)
+RAMP_RATE: Final = _take(1)
+RAMP_OFFSET: Final = _take(1)
+CONTROL_PERIOD: Final = _take(1)
+"""Length of one motion segment (a control step, or an equal part of a long one)."""
+SUBSTEPS: Final = _take(1)
+HALF_STEP_DECAY: Final = _take(1)
+"""exp(-h / (2 lag)): decay of the winch's speed error over half an inner step; 0 without lag."""
+RECORD: Final = _take(1)
+"""First line of the row's recorded motion in the engine's table, or -1."""
+RECORD_LENGTH: Final = _take(1)
+
+# Scratch of one control step.
+PATH: Final = _take(18)
+"""Quintic through the pulley's path: coefficients 0..5 for each axis (axis-major)."""
+TIP: Final = _take(6)
+"""Pulley's position and velocity at the start of the inner step."""
+WINCH: Final = _take(7)
+"""Plan of the winch: direction, ramp time, start of decay, first decaying half step, error, start angle, speed."""
+
+ROW_SLOTS: Final = _next()
+
+# Wave components follow, COMPONENT_SLOTS for each.
+PHASE_RE: Final = 0
+PHASE_IM: Final = 1
+TURN_RE: Final = 2
+TURN_IM: Final = 3
+FREQUENCY: Final = 4
+RESPONSE: Final = 5
+"""Six complex amplitudes: real parts at RESPONSE + dof, imaginary parts at RESPONSE + 6 + dof."""
+COMPONENT_SLOTS: Final = 17
+UNROLL: Final = 4
+"""Wave components are summed this many at a time; a row has room for a multiple of it."""
+
+
+def padded(components: int) -> int:
+    """Room that ``components`` wave components need: the next multiple of UNROLL."""
+    return -(-components // UNROLL) * UNROLL
+
+
+def slots(components: int) -> int:
+    """Slots of a row with room for ``components`` wave components, a multiple of UNROLL."""
+    return ROW_SLOTS + COMPONENT_SLOTS * components

@@ -1,0 +1,72 @@
+"""The winch as an actuator: speed follows its command within limits, in closed form over a control step.
+
+While the command is constant, the speed approaches it at the greatest acceleration a until the error is a·lag,
+then exponentially. Without lag it ramps onto the command. The drum angle is the exact integral.
+"""
+
+from __future__ import annotations
+
+import math
+
+from aframe_env.dynamics.compiling import scalar
+
+
+@scalar
+def plan(
+    command: float, speed: float, max_acceleration: float, lag: float, half_step: float
+) -> tuple[float, float, float, float, float]:
+    """Plan of a control step: direction, ramp time, error after the ramp, first decaying half step, error there.
+
+    The error is the distance of the speed from its command [rad/s]; half steps are counted from the start.
+    """
+    gap = command - speed
+    direction = 1.0 if gap >= 0.0 else -1.0
+    gap = abs(gap)
+    error = max_acceleration * lag
+    error = gap if gap < error else error
+    ramp_time = (gap - error) / max_acceleration
+    first = math.ceil(ramp_time / half_step)
+    error_there = error
+    if lag > 0.0:
+        error_there = error * math.exp(-(first * half_step - ramp_time) / lag)
+    return direction, ramp_time, error, first, error_there
+
+
+@scalar
+def next_error(error: float, half_step_index: float, first: float, decay: float) -> float:
+    """Speed error at the next half step, given that of the one before it."""
+    return error if half_step_index <= first else error * decay
+
+
+@scalar
+def drum_state(
+    elapsed: float,
+    angle: float,
+    speed: float,
+    command: float,
+    max_acceleration: float,
+    lag: float,
+    direction: float,
+    ramp_time: float,
+    error_after_ramp: float,
+    error: float,
+    min_angle: float,
+    max_angle: float,
+) -> tuple[float, float]:
+    """Drum angle [rad] and speed [rad/s] ``elapsed`` s after the command was given.
+
+    At the limit switches (least and greatest paid-out length) the brake holds the drum.
+    """
+    ramping = elapsed < ramp_time
+    ramp = elapsed if ramping else ramp_time
+    rest = elapsed - ramp
+    after_ramp = angle + ramp * (speed + 0.5 * direction * max_acceleration * ramp)
+    settled = after_ramp + command * rest - direction * lag * (error_after_ramp - error)
+    new_angle = after_ramp if ramping else settled
+    new_speed = speed + direction * max_acceleration * ramp if ramping else command - direction * error
+    low = new_angle <= min_angle
+    high = new_angle >= max_angle
+    new_speed = 0.0 if (low and new_speed < 0.0) or (high and new_speed > 0.0) else new_speed
+    new_angle = min_angle if low else new_angle
+    new_angle = max_angle if high else new_angle
+    return new_angle, new_speed
