@@ -24,6 +24,8 @@ def _take(size: int) -> int:
 
 
 # State.
+STEP: Final = _take(1)
+"""Motion segments since the start."""
 TIME: Final = _take(1)
 LOAD_POSITION: Final = _take(3)
 LOAD_VELOCITY: Final = _take(3)
@@ -43,6 +45,8 @@ PEAK_TENSION: Final = _take(1)
 """Greatest tension within the last control step."""
 SLACK: Final = _take(1)
 """1 where the rope was slack within the last control step."""
+CHARGED: Final = _take(1)
+"""1 once the task has charged a parted row for the rest of its episode."""
 PARTED: Final = _take(1)
 """1 from the moment at which the tension passed the breaking load."""
 

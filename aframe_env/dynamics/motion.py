@@ -80,7 +80,7 @@ def read_record(row: Block, records: npt.NDArray[np.float64], lanes: int) -> Non
     for j in range(lanes):
         first = int(row[at.RECORD * lanes + j])
         if first >= 0:
-            line = int(round(row[at.TIME * lanes + j] / row[at.CONTROL_PERIOD * lanes + j]))
+            line = int(row[at.STEP * lanes + j])
             last = int(row[at.RECORD_LENGTH * lanes + j]) - 1
             line = line if line < last else last
             for i in range(18):
@@ -155,7 +155,8 @@ def advance_motion(row: Block, components: int, records: npt.NDArray[np.float64]
         for j in range(lanes):
             row[(at.PATH + i) * lanes + j] = row[(at.PULLEY + i) * lanes + j]
     for j in range(lanes):
-        row[at.TIME * lanes + j] += row[at.CONTROL_PERIOD * lanes + j]
+        row[at.STEP * lanes + j] += 1.0
+        row[at.TIME * lanes + j] = row[at.STEP * lanes + j] * row[at.CONTROL_PERIOD * lanes + j]
     turn_components(row, components, lanes)
     pose_deck(row, components, records, lanes)
     for j in range(lanes):

@@ -188,6 +188,8 @@ def control_step(row: Array, components: int, segments: int, records: Array, lan
 @scalar
 def start_rows(row: Array, components: int, records: Array, lanes: int) -> None:
     """Deck, pulley and rope tension at the row's time, before the first step."""
+    for j in range(lanes):
+        row[at.SLACK * lanes + j] = 0.0
     pose_deck(row, components, records, lanes)
     measure_tension(row, lanes)
     for j in range(lanes):

@@ -1,0 +1,230 @@
+"""The engine: many rows of the model, advanced together by one control step at a time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from aframe_env.dynamics import layout as at
+from aframe_env.dynamics.step import step_kernels
+from aframe_env.motion import ComponentMotion, Components, ShipMotion, TabledMotion
+from aframe_env.scenario import Scenario
+from aframe_env.validation import InvalidValue, require_integer, require_number
+
+FloatArray = npt.NDArray[np.float64]
+
+MAX_SEGMENT: Final = 0.2
+"""Longest stretch of time that one quintic of the pulley's path spans, s."""
+MAX_INNER_STEP: Final = 0.02
+"""Longest inner step, s."""
+INNER_STEP_PHASE: Final = 0.1
+"""Most that the load's bobbing on the rope turns in one inner step, rad: RK4's phase error is then below 1e-6
+of the angle turned."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How a control period is divided."""
+
+    segments: int
+    """Motion segments in a control period."""
+    segment: float
+    """Length of a segment, s."""
+    substeps: int
+    """Inner steps in a segment."""
+
+    @property
+    def inner_step(self) -> float:
+        """s."""
+        return self.segment / self.substeps
+
+
+def timing(scenario: Scenario, control_period: float, max_inner_step: float | None = None) -> Timing:
+    """Divide a control period [s] for a scenario: the stiffer the rope, the finer the inner step."""
+    segments = math.ceil(control_period / MAX_SEGMENT - 1e-9)
+    segment = control_period / segments
+    longest = max_inner_step or min(MAX_INNER_STEP, INNER_STEP_PHASE / scenario.rope_frequency)
+    return Timing(segments, segment, max(1, math.ceil(segment / longest - 1e-9)))
+
+
+class Engine:
+    """Rows of the simplified model side by side, each with its own scenario.
+
+    A row's history depends on its scenario and its commands alone, to the last bit: not on the other rows, their
+    number, or its place among them.
+    """
+
+    def __init__(
+        self, rows: int, control_period: float, components: int = 32, max_inner_step: float | None = None
+    ) -> None:
+        """Make room for ``rows`` rows of up to ``components`` wave components each (it grows on demand).
+
+        ``control_period`` [s] is in [0.001, 2]; ``max_inner_step`` [s] overrides the choice of the inner step.
+        """
+        require_integer("rows", rows, low=1, high=2**24)
+        require_number("control_period", control_period, "s", low=1e-3, high=2.0)
+        if max_inner_step is not None:
+            require_number("max_inner_step", max_inner_step, "s", low=1e-6, high=MAX_SEGMENT)
+        self.rows = rows
+        self.control_period = float(control_period)
+        self._max_inner_step = max_inner_step
+        self._segments = math.ceil(control_period / MAX_SEGMENT - 1e-9)
+        self._lanes = 1 if rows == 1 else at.LANES
+        self._kernels = step_kernels(self._lanes)
+        self._step = self._kernels.step if rows <= at.LANES else self._kernels.step_parallel
+        self._components = at.padded(components)
+        self._blocks = np.zeros((-(-rows // self._lanes), at.slots(self._components) * self._lanes))
+        self._records = np.zeros((0, 18))
+        self._record_of: dict[int, tuple[TabledMotion, int, int]] = {}
+        # Lanes beyond the last row hold the paper's case, so that no lane computes with zeros for parameters.
+        idle = self.row_vector(Scenario.paper())
+        view = self._view
+        view[...] = idle[None, :, None]
+
+    @property
+    def _view(self) -> FloatArray:
+        """The rows' quantities: (blocks, slots, lanes)."""
+        return self._blocks.reshape(len(self._blocks), -1, self._lanes)
+
+    def read(self, slot: int) -> FloatArray:
+        """Copy one quantity (a slot of ``layout``) of all rows: (rows,)."""
+        return self._view[:, slot].reshape(-1)[: self.rows].copy()
+
+    def read_many(self, slot: int, size: int) -> FloatArray:
+        """Copy ``size`` successive quantities of all rows: (rows, size)."""
+        return self._view[:, slot : slot + size].transpose(0, 2, 1).reshape(-1, size)[: self.rows].copy()
+
+    @property
+    def blocks(self) -> FloatArray:
+        """The array itself, (blocks, slots * lanes); see ``layout``."""
+        return self._blocks
+
+    @property
+    def lanes(self) -> int:
+        """Rows in a block."""
+        return self._lanes
+
+    def step(self, commands: FloatArray) -> None:
+        """Advance every row by one control step with the drum speed commands (rows,) rad/s."""
+        if self._lanes == 1:
+            self._blocks[0, at.COMMAND] = commands[0]
+        else:
+            full, rest = divmod(self.rows, self._lanes)
+            column = self._view[:, at.COMMAND]
+            column[:full] = commands[: full * self._lanes].reshape(full, self._lanes)
+            if rest:
+                column[full, :rest] = commands[full * self._lanes :]
+        self._step(self._blocks, self._components, self._segments, self._records)
+
+    def reset_row(self, index: int, scenario: Scenario) -> None:
+        """Put a row at the start of a scenario."""
+        self.write_row(index, self.row_vector(scenario))
+
+    def write_row(self, index: int, vector: FloatArray) -> None:
+        """Overwrite a row with a vector that ``row_vector`` or ``copy_row`` gave."""
+        block, lane = divmod(index, self._lanes)
+        view = self._view
+        view[block, : len(vector), lane] = vector
+        view[block, len(vector) :, lane] = 0.0
+
+    def copy_row(self, index: int) -> FloatArray:
+        """Return everything the engine knows of a row: (slots,)."""
+        block, lane = divmod(index, self._lanes)
+        return self._view[block, :, lane].copy()
+
+    def row_vector(self, scenario: Scenario) -> FloatArray:
+        """Slots of a row at the start of a scenario: (slots,)."""
+        times = timing(scenario, self.control_period, self._max_inner_step)
+        motion: ShipMotion = scenario.motion
+        if isinstance(motion, ComponentMotion):
+            components = motion.components()
+            record, record_length = -1, 0
+        else:
+            components = Components(np.zeros(0), np.zeros((0, 6), dtype=np.complex128))
+            record, record_length = self._record(motion, times.segment)
+        self._make_room(len(components.frequency))
+        row = np.zeros(at.slots(self._components))
+        _fill_parameters(row, scenario, times)
+        row[at.RECORD], row[at.RECORD_LENGTH] = record, record_length
+        _fill_components(row, components, times.segment)
+        self._kernels_of_one.start(row[None], self._components, self._records)
+        _place_load(row, scenario)
+        self._kernels_of_one.start(row[None], self._components, self._records)
+        return row
+
+    @property
+    def _kernels_of_one(self):  # type: ignore[no-untyped-def]
+        return step_kernels(1)
+
+    def _record(self, motion: TabledMotion, segment: float) -> tuple[int, int]:
+        """First line and length of a recorded motion in the table of records, which it is added to when new."""
+        known = self._record_of.get(id(motion))
+        if known is None:
+            table = motion.table(segment)
+            known = (motion, len(self._records), len(table))
+            self._records = np.concatenate([self._records, table])
+            self._record_of[id(motion)] = known
+        return known[1], known[2]
+
+    def _make_room(self, components: int) -> None:
+        """Widen the rows when a motion has more components than there is room for."""
+        if components <= self._components:
+            return
+        old = self._blocks
+        self._components = at.padded(components)
+        self._blocks = np.zeros((len(old), at.slots(self._components) * self._lanes))
+        self._blocks[:, : old.shape[1]] = old
+
+
+def _fill_parameters(row: FloatArray, scenario: Scenario, times: Timing) -> None:
+    crane = scenario.crane
+    winch, rope = crane.winch, crane.rope
+    row[at.MASS] = scenario.load_mass
+    row[at.GRAVITY] = scenario.gravity
+    row[at.TARGET] = scenario.target_level
+    row[at.AXIAL_STIFFNESS] = rope.axial_stiffness
+    row[at.ROPE_DAMPING] = scenario.rope_damping
+    row[at.BREAKING_LOAD] = rope.breaking_load
+    row[at.FREE_LENGTH] = scenario.free_length
+    row[at.DRUM_TO_PULLEY] = crane.drum_to_pulley
+    row[at.DRUM_RADIUS] = winch.drum_radius
+    row[at.MAX_SPEED] = winch.max_speed
+    row[at.MAX_ACCELERATION] = winch.max_acceleration
+    row[at.LAG] = winch.lag
+    row[at.MIN_ANGLE] = (winch.min_rope_length - scenario.free_length) / winch.drum_radius
+    row[at.MAX_ANGLE] = (winch.max_rope_length - scenario.free_length) / winch.drum_radius
+    row[at.PULLEY_ON_DECK : at.PULLEY_ON_DECK + 3] = crane.pulley_position
+    row[at.RAMP_RATE] = 1.0 / scenario.ramp if scenario.ramp else 0.0
+    row[at.RAMP_OFFSET] = 0.0 if scenario.ramp else 1.0
+    row[at.CONTROL_PERIOD] = times.segment
+    row[at.SUBSTEPS] = times.substeps
+    row[at.HALF_STEP_DECAY] = math.exp(-0.5 * times.inner_step / winch.lag) if winch.lag else 0.0
+
+
+def _fill_components(row: FloatArray, components: Components, segment: float) -> None:
+    slots = row[at.ROW_SLOTS :].reshape(-1, at.COMPONENT_SLOTS)
+    count = len(components.frequency)
+    slots[:, at.PHASE_RE] = 1.0
+    slots[:, at.TURN_RE] = 1.0
+    slots[:count, at.TURN_RE] = np.cos(components.frequency * segment)
+    slots[:count, at.TURN_IM] = np.sin(components.frequency * segment)
+    slots[:count, at.FREQUENCY] = components.frequency
+    slots[:count, at.RESPONSE : at.RESPONSE + 6] = components.response.real
+    slots[:count, at.RESPONSE + 6 : at.RESPONSE + 12] = components.response.imag
+
+
+def _place_load(row: FloatArray, scenario: Scenario) -> None:
+    """Hang the load at rest on its rope under the pulley, where the pulley is at the start."""
+    pulley = row[at.PULLEY : at.PULLEY + 3]
+    row[at.LOAD_POSITION : at.LOAD_POSITION + 3] = pulley
+    row[at.LOAD_POSITION + 2] -= scenario.rope_length
+    if scenario.initial == "comoving":
+        row[at.LOAD_VELOCITY : at.LOAD_VELOCITY + 3] = row[at.PULLEY + 3 : at.PULLEY + 6]
+    row[at.OMEGA2] = abs(row[at.LOAD_POSITION + 2] - scenario.target_level)
+
+
+__all__ = ["Engine", "InvalidValue", "Timing", "timing"]

@@ -1,0 +1,245 @@
+"""The scalar environment, AFrameHeave-v0."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+
+from aframe_env import task
+from aframe_env.scenario import Scenario, ScenarioSource
+from aframe_env.simulation import RowState, Simulation
+from aframe_env.validation import InvalidValue, require_choice
+
+_ROW = np.zeros(1, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class EnvState:
+    """Everything that the rest of an environment's life depends on: the row and the generator."""
+
+    row: RowState
+    generator: dict[str, Any]
+
+
+class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
+    """Hold a load still at depth while the ship heaves, by turning the winch drum.
+
+    ## Description
+    A load of 20 to 100 t hangs on an elastic rope from an A-frame at the stern of a ship in a random sea. The drum
+    pays rope out and in. The load shall stay at its required level h. The model is the simplified one of
+    Adamiec-Wójcik, Fałat, Maczyński and Wojciech (2009), eqs. (37)-(41): rigid frame, six-degree-of-freedom ship
+    motion, the load a particle on a rope that is elastic, damped and cannot push.
+
+    Axes: x outboard (aft), z up, y to the left of somebody who looks outboard; origin at the mean place of the deck
+    frame, midway between the frame's feet. SI units, angles in radians.
+
+    ## Action space
+    `Box(-w, w, (1,), float32)`: commanded angular velocity of the drum, rad/s; positive pays out. w is the winch's
+    limit (4 rad/s, that is 3 m/s of rope, for the reference crane). The drum follows the command within its limits
+    of acceleration (2 m/s² of rope) and its lag; the observation has the actual speed. At the least and greatest
+    paid-out length the limit switches stop the drum.
+
+    ## Observation space
+    `observation="state"` (default), `Box(14,) float32`, values beyond a range are clipped to it:
+
+    | # | symbol | meaning | unit | range |
+    | --- | --- | --- | --- | --- |
+    | 0 | x_L3 - h | depth error of the load | m | ±1e3 |
+    | 1 | x'_L3 | vertical velocity of the load | m/s | ±100 |
+    | 2, 3 | x_L1 - x_S1, x_L2 - x_S2 | horizontal offset of the load from the pulley | m | ±1e3 |
+    | 4, 5 | x'_L1, x'_L2 | horizontal velocity of the load | m/s | ±100 |
+    | 6 | x_S3 - x_S3(rest) | heave of the pulley S | m | ±100 |
+    | 7 | x'_S3 | vertical velocity of the pulley | m/s | ±100 |
+    | 8 | x''_S3 | vertical acceleration of the pulley | m/s² | ±100 |
+    | 9 | φ_H | drum angle, from the start | rad | ±1e5 |
+    | 10 | φ'_H | actual drum speed | rad/s | ±1e3 |
+    | 11 | T | rope tension | N | 0 ... 1e8 |
+    | 12 | m_L | mass of the load | kg | 0 ... 1e7 |
+    | 13 | l | unstretched rope length between drum and load | m | 0 ... 1e5 |
+
+    `observation="sensors"`, or a `Sensors` of your own, `Box(10,) float32`: what instruments read, with noise, delay,
+    sampling and resolution (see `Sensors`):
+
+    | # | meaning | unit | range |
+    | --- | --- | --- | --- |
+    | 0 | heave of the pulley, by the motion reference unit | m | ±100 |
+    | 1 | vertical velocity of the pulley, likewise | m/s | ±100 |
+    | 2, 3 | roll and pitch of the ship, likewise | rad | ±π |
+    | 4 | drum angle, by its encoder | rad | ±1e5 |
+    | 5 | drum speed | rad/s | ±1e3 |
+    | 6 | rope tension, by a load pin | N | ±1e8 |
+    | 7 | depth error of the load, slow and coarse | m | ±1e3 |
+    | 8 | mass of the load | kg | 0 ... 1e7 |
+    | 9 | unstretched rope length at the start | m | 0 ... 1e5 |
+
+    ## Reward
+    Minus the integral of (x_L3 - h)² over the control step, m² s: the return of an episode is exactly -Ω1, eq. (31).
+
+    ## Starting state
+    The load hangs at rest on its rope below the pulley, with the rope length that puts it at h when the ship is at
+    rest; the drum stands still. In drawn scenarios the ship's motion builds up over the first 10 s.
+
+    ## Episode end
+    - Truncation: after `episode_duration`.
+    - Termination: the rope's tension passed its breaking load and the load is lost. It then falls freely, and the
+      last reward includes what that costs until the end of the episode: to lose the load never pays.
+
+    ## Information
+    `time` [s], `load_position` (3,) [m], `rope_tension` [N], `slack` (the rope was slack within the last step),
+    `omega1` [m² s] and `omega2` [m] so far, eqs. (31), (32).
+
+    ## Arguments
+    All by keyword, as in `gymnasium.make("AFrameHeave-v0", control_period=0.2)`:
+
+    - `model`: "simplified".
+    - `scenario`: a `Scenario` for every episode, or the `ScenarioDistribution` to draw from. Default: Hs 0.5-4 m,
+      Tp 6-14 s, any heading, load 20-100 t, rope 50-1500 m.
+    - `control_period`: 0.001 to 2 s (default 0.1).
+    - `episode_duration`: s (default 60).
+    - `observation`: "state", "sensors", or a `Sensors`.
+    - `max_inner_step`: s; overrides the choice of the integrator's step.
+    - `render_mode`: None, "human" or "rgb_array".
+
+    `reset(options={"scenario": ...})` takes a `Scenario` for the one episode.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # type: ignore[misc]
+
+    def __init__(
+        self,
+        *,
+        model: str = "simplified",
+        scenario: ScenarioSource | None = None,
+        control_period: float = 0.1,
+        episode_duration: float = 60.0,
+        observation: task.Observation = "state",
+        max_inner_step: float | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        if render_mode is not None:
+            require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
+        self._simulation = Simulation(
+            1,
+            model=model,
+            scenario=scenario,
+            control_period=control_period,
+            episode_duration=episode_duration,
+            observation=observation,
+            max_inner_step=max_inner_step,
+        )
+        self.observation_space = self._simulation.observation_space
+        self.action_space = self._simulation.action_space
+        self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / control_period))}
+        self.render_mode = render_mode
+        self._renderer: Any = None
+
+    @property
+    def simulation(self) -> Simulation:
+        """The simulation behind the environment, for reading."""
+        return self._simulation
+
+    @property
+    def scenario(self) -> Scenario:
+        """The present episode's scenario."""
+        scenario = self._simulation.scenarios[0]
+        if scenario is None:
+            raise gymnasium.error.ResetNeeded("no scenario before the first reset()")
+        return scenario
+
+    @property
+    def control_period(self) -> float:
+        """s."""
+        return self._simulation.control_period
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
+        """Start an episode; ``options={"scenario": Scenario}`` fixes what it is."""
+        super().reset(seed=seed)
+        drawn = self._simulation.draw(self.np_random, _scenario_option(options))
+        self._simulation.reset_rows(_ROW, [drawn])
+        if self._renderer is not None:
+            self._renderer.reset()
+        if self.render_mode == "human":
+            self.render()
+        return self._simulation.observe()[0], self._info(self._simulation.results[0].tolist())
+
+    def step(
+        self, action: npt.NDArray[np.float32]
+    ) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Advance by one control step with ``action`` (1,) rad/s held."""
+        simulation = self._simulation
+        if simulation.scenarios[0] is None:
+            raise gymnasium.error.ResetNeeded("step() before the first reset()")
+        command = np.asarray(action, dtype=np.float64)
+        if command.shape != (1,):
+            raise InvalidValue(f"action of shape {command.shape}: must be of shape (1,), rad/s")
+        if not np.isfinite(command[0]):
+            limit = float(self.action_space.high[0])  # type: ignore[attr-defined]
+            raise InvalidValue(f"action = {action!r} rad/s: must be finite, in [{-limit:g}, {limit:g}]")
+        simulation.advance(command)
+        results = simulation.results[0].tolist()
+        truncated = bool(simulation.steps[0] >= simulation.episode_steps)
+        if self.render_mode == "human":
+            self.render()
+        return (
+            simulation.observe()[0],
+            -results[task.COST],
+            results[task.PARTED] > 0.0,
+            truncated,
+            self._info(results),
+        )
+
+    def get_state(self) -> EnvState:
+        """Return everything that the rest of the episode, and the draws of later ones, depend on."""
+        return EnvState(self._simulation.copy_row(0), self.np_random.bit_generator.state)
+
+    def set_state(self, state: EnvState) -> None:
+        """Go back to a state that ``get_state`` returned, in this environment or one of the same arguments."""
+        self._simulation.write_row(0, state.row)
+        self.np_random.bit_generator.state = state.generator
+
+    def render(self) -> npt.NDArray[np.uint8] | None:  # type: ignore[override]
+        """Draw ship, frame, rope, load and error (``render_mode`` "rgb_array" returns the picture)."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() without a render_mode: pass render_mode='rgb_array' to make()")
+            return None
+        from aframe_env.rendering.renderer import Renderer
+        from aframe_env.rendering.view import scene_of
+
+        if self._renderer is None:
+            self._renderer = Renderer(self.render_mode, self.metadata["render_fps"])  # type: ignore[arg-type]
+        return self._renderer.draw(scene_of(self._simulation, 0))  # type: ignore[no-any-return]
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_renderer": None}
+
+    @staticmethod
+    def _info(results: list[float]) -> dict[str, Any]:
+        return {
+            "time": results[task.TIME],
+            "load_position": np.array(results[task.LOAD : task.LOAD + 3]),
+            "rope_tension": results[task.TENSION],
+            "slack": results[task.SLACK] > 0.0,
+            "omega1": results[task.OMEGA1],
+            "omega2": results[task.OMEGA2],
+        }
+
+
+def _scenario_option(options: dict[str, Any] | None) -> Any:
+    if not options:
+        return None
+    unknown = set(options) - {"scenario"}
+    if unknown:
+        raise InvalidValue(f"options: unknown key {sorted(unknown)[0]!r}: must be 'scenario'")
+    return options.get("scenario")

@@ -1,0 +1,204 @@
+"""Scenario: everything that fixes one episode; and the distribution that scenarios are drawn from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from aframe_env.crane import GRAVITY, Crane
+from aframe_env.motion import ComponentMotion, HarmonicMotion, ShipMotion, TabledMotion
+from aframe_env.sea import Sea, SeaMotion, dnv_gamma
+from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
+from aframe_env.vessel import Vessel
+
+Initial = Literal["comoving", "rest"]
+INITIALS: tuple[str, ...] = ("comoving", "rest")
+
+Range = float | tuple[float, float]
+"""One exact value, or the interval that a value is drawn from uniformly."""
+
+_UNIFORMS = 8  # numbers that each sub-stream takes from the generator, however many it needs
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """Everything that fixes one episode: crane, ship motion, load, rope."""
+
+    crane: Crane = field(default_factory=Crane)
+    motion: ShipMotion = field(default_factory=HarmonicMotion.paper)
+    load_mass: float = 1.0e5
+    """m_L, kg."""
+    target_level: float = -300.0
+    """h, the required load coordinate x_L3, m; negative below the mean deck origin."""
+    rope_damping: float = 0.0
+    """d_R, N s/m."""
+    initial: Initial = "comoving"
+    """Whether the load starts with the pulley's velocity or at rest."""
+    ramp: float = 0.0
+    """Time over which the ship's motion builds up from nothing, s (a quintic smoothstep); 0 for none."""
+    gravity: float = GRAVITY
+    """g, m/s²."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.crane, Crane):
+            raise InvalidValue(f"crane = {self.crane!r}: must be a Crane")
+        if not isinstance(self.motion, ComponentMotion | TabledMotion):
+            raise InvalidValue(f"motion = {self.motion!r}: must be a ship motion (HarmonicMotion, SeaMotion, ...)")
+        require_number("load_mass", self.load_mass, "kg", low=0.0, high=1e7, low_open=True)
+        require_number("target_level", self.target_level, "m")
+        require_number("rope_damping", self.rope_damping, "N s/m", low=0.0, high=1e8)
+        require_choice("initial", self.initial, INITIALS)
+        require_number("ramp", self.ramp, "s", low=0.0, high=1e4)
+        require_number("gravity", self.gravity, "m/s²", low=0.0, high=100.0, low_open=True)
+        least, most = self.crane.winch.min_rope_length, self.crane.winch.max_rope_length
+        pulley = self.crane.pulley_position[2]
+        if self.target_level >= pulley:
+            raise InvalidValue(
+                f"target_level = {self.target_level!r} m: must be below the pulley, in (-inf, {pulley:g}) m"
+            )
+        if not least < self.free_length < most:
+            raise InvalidValue(
+                f"target_level = {self.target_level!r} m needs {self.free_length:g} m of unstretched rope between "
+                f"drum and load: must be in ({least:g}, {most:g}) m, the winch's limits"
+            )
+
+    @classmethod
+    def paper(cls, initial: Initial = "comoving", rope_damping: float = 0.0, **changes: Any) -> Scenario:
+        """Return the case of the source's section 4 on the reference crane: motion (42), 100 t at h = -300 m.
+
+        ``changes`` replace further fields.
+        """
+        return cls(**{"initial": initial, "rope_damping": rope_damping, **changes})
+
+    @property
+    def rope_length(self) -> float:
+        """|LS| with the ship at rest and the load at its target, m."""
+        return self.crane.pulley_position[2] - self.target_level
+
+    @property
+    def weight(self) -> float:
+        """Weight of the load, N."""
+        return self.load_mass * self.gravity
+
+    @property
+    def free_length(self) -> float:
+        """l_0, m: unstretched length between drum and load that holds the load at its target, ship at rest."""
+        strain = self.weight / self.crane.rope.axial_stiffness
+        return (self.rope_length + self.crane.drum_to_pulley) / (1.0 + strain)
+
+    @property
+    def rope_stiffness(self) -> float:
+        """c_R = E_R F_R / l_0, N/m."""
+        return self.crane.rope.axial_stiffness / self.free_length
+
+    @property
+    def rope_frequency(self) -> float:
+        """Angular frequency of the load bobbing on the rope, rad/s."""
+        return math.sqrt(self.rope_stiffness / self.load_mass)
+
+
+def _require_range(name: str, value: Range, unit: str, low: float, high: float, low_open: bool = False) -> None:
+    if isinstance(value, tuple):
+        if len(value) != 2:
+            raise InvalidValue(f"{name} = {value!r}: must be a number or a pair (low, high) in {unit}")
+        for part, item in zip(("low", "high"), value, strict=True):
+            require_number(f"{name} ({part})", item, unit, low=low, high=high, low_open=low_open)
+        if value[0] > value[1]:
+            raise InvalidValue(f"{name} = {value!r} {unit}: the low end is above the high end")
+    else:
+        require_number(name, value, unit, low=low, high=high, low_open=low_open)
+
+
+def _draw(value: Range, uniform: float) -> float:
+    return value[0] + (value[1] - value[0]) * uniform if isinstance(value, tuple) else value
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScenarioDistribution:
+    """What scenarios are drawn from: seas, load masses and rope lengths, each exact or an interval.
+
+    Sea, load and rope take their random numbers from sub-streams of their own: changing one leaves the others'
+    draws alone.
+    """
+
+    hs: Range = (0.5, 4.0)
+    """Significant wave height, m."""
+    tp: Range = (6.0, 14.0)
+    """Peak period, s."""
+    heading: Range = (0.0, 2.0 * math.pi)
+    """Direction that the waves travel towards, rad from the bow."""
+    gamma: Range | Literal["dnv"] = "dnv"
+    """Peak enhancement factor; "dnv" takes the one that goes with Hs and Tp."""
+    spectrum: str = "jonswap"
+    spreading: int | None = None
+    components: int = 32
+    vessel: Vessel = field(default_factory=Vessel.supply)
+    load_mass: Range = (20.0e3, 100.0e3)
+    """kg."""
+    rope_length: Range = (50.0, 1500.0)
+    """|LS| with the ship at rest, m."""
+    rope_damping_ratio: Range = (0.01, 0.05)
+    """Damping of the load's bobbing on the rope, share of critical."""
+    ramp: float = 10.0
+    """Time over which the ship's motion builds up, s."""
+    crane: Crane = field(default_factory=Crane)
+
+    def __post_init__(self) -> None:
+        _require_range("hs", self.hs, "m", 0.0, 30.0)
+        _require_range("tp", self.tp, "s", 2.0, 40.0)
+        _require_range("heading", self.heading, "rad", -1e3, 1e3)
+        if self.gamma != "dnv":
+            if isinstance(self.gamma, str):
+                raise InvalidValue(f"gamma = {self.gamma!r}: must be 'dnv', a number or a pair in [1, 10]")
+            _require_range("gamma", self.gamma, "", 1.0, 10.0)
+        require_number("ramp", self.ramp, "s", low=0.0, high=1e4)
+        _require_range("load_mass", self.load_mass, "kg", 0.0, 1e7, low_open=True)
+        _require_range("rope_length", self.rope_length, "m", 0.0, 1e5, low_open=True)
+        _require_range("rope_damping_ratio", self.rope_damping_ratio, "of critical", 0.0, 1.0)
+        require_integer("components", self.components, low=1, high=4096)
+        # The corners of the distribution must be scenarios: refuse now rather than in the middle of a run.
+        for u in (0.0, 1.0):
+            self._build(np.full(_UNIFORMS, u), np.full(_UNIFORMS, u), np.full(_UNIFORMS, u))
+
+    def draw(self, rng: np.random.Generator) -> Scenario:
+        """Draw one scenario."""
+        u = rng.random(3 * _UNIFORMS)
+        return self._build(u[:_UNIFORMS], u[_UNIFORMS : 2 * _UNIFORMS], u[2 * _UNIFORMS :])
+
+    def nominal(self) -> Scenario:
+        """Return the scenario in the middle of every interval, with the first realisation of its sea."""
+        half = np.full(_UNIFORMS, 0.5)
+        sea = half.copy()
+        sea[4] = 0.0
+        return self._build(sea, half, half)
+
+    def _build(self, u_sea: np.ndarray, u_load: np.ndarray, u_rope: np.ndarray) -> Scenario:
+        s, m, r = u_sea.tolist(), u_load.tolist(), u_rope.tolist()
+        hs, tp = _draw(self.hs, s[0]), _draw(self.tp, s[1])
+        gamma = dnv_gamma(hs, tp) if self.gamma == "dnv" else _draw(self.gamma, s[3])  # type: ignore[arg-type]
+        sea = Sea(
+            hs=hs,
+            tp=tp,
+            heading=_draw(self.heading, s[2]),
+            spectrum=self.spectrum,
+            gamma=gamma,
+            spreading=self.spreading,
+            components=self.components,
+            seed=int(s[4] * 2**53),
+        )
+        scenario = Scenario(
+            crane=self.crane,
+            motion=SeaMotion(sea=sea, vessel=self.vessel),
+            load_mass=_draw(self.load_mass, m[0]),
+            target_level=self.crane.pulley_position[2] - _draw(self.rope_length, r[0]),
+            ramp=self.ramp,
+        )
+        critical = 2.0 * scenario.load_mass * scenario.rope_frequency
+        return replace(scenario, rope_damping=_draw(self.rope_damping_ratio, r[1]) * critical)
+
+
+ScenarioSource = Scenario | ScenarioDistribution
+"""What an environment takes: one fixed scenario, or the distribution to draw from."""

@@ -1,0 +1,174 @@
+"""The task, apart from the physics: what is observed, what it costs, when it ends."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+
+from aframe_env.dynamics import layout as at
+from aframe_env.dynamics.compiling import kernel, scalar, source_digest
+from aframe_env.sensors import CHANNELS, Sensors
+
+Observation = Literal["state", "sensors"] | Sensors
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One entry of the observation."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+
+
+STATE: Final = (
+    Quantity("depth_error", "m", -1e3, 1e3),
+    Quantity("load_velocity_z", "m/s", -100.0, 100.0),
+    Quantity("load_offset_x", "m", -1e3, 1e3),
+    Quantity("load_offset_y", "m", -1e3, 1e3),
+    Quantity("load_velocity_x", "m/s", -100.0, 100.0),
+    Quantity("load_velocity_y", "m/s", -100.0, 100.0),
+    Quantity("pulley_heave", "m", -100.0, 100.0),
+    Quantity("pulley_velocity_z", "m/s", -100.0, 100.0),
+    Quantity("pulley_acceleration_z", "m/s²", -100.0, 100.0),
+    Quantity("drum_angle", "rad", -1e5, 1e5),
+    Quantity("drum_speed", "rad/s", -1e3, 1e3),
+    Quantity("rope_tension", "N", 0.0, 1e8),
+    Quantity("load_mass", "kg", 0.0, 1e7),
+    Quantity("rope_length", "m", 0.0, 1e5),
+)
+"""Observation "state". Order and ranges; a value beyond its range is clipped to it."""
+
+_RANGES: Final = {
+    "heave": Quantity("pulley_heave", "m", -100.0, 100.0),
+    "heave_rate": Quantity("pulley_velocity_z", "m/s", -100.0, 100.0),
+    "roll": Quantity("roll", "rad", -math.pi, math.pi),
+    "pitch": Quantity("pitch", "rad", -math.pi, math.pi),
+    "drum_angle": Quantity("drum_angle", "rad", -1e5, 1e5),
+    "drum_speed": Quantity("drum_speed", "rad/s", -1e3, 1e3),
+    "tension": Quantity("rope_tension", "N", -1e8, 1e8),
+    "depth_error": Quantity("depth_error", "m", -1e3, 1e3),
+}
+SENSED: Final = (
+    *(_RANGES[name] for name in CHANNELS),
+    Quantity("load_mass", "kg", 0.0, 1e7),
+    Quantity("rope_length", "m", 0.0, 1e5),
+)
+"""Observation "sensors": the readings, and what the operator knows of the lift before it begins."""
+
+# What a step reports beside the observation, in double precision.
+TIME, LOAD, TENSION, SLACK, OMEGA1, OMEGA2, COST, PARTED = 0, 1, 4, 5, 6, 7, 8, 9
+RESULTS: Final = 10
+
+
+def box(quantities: tuple[Quantity, ...]) -> spaces.Box:
+    """Return the space of an observation."""
+    return spaces.Box(
+        np.array([q.low for q in quantities], dtype=np.float32),
+        np.array([q.high for q in quantities], dtype=np.float32),
+        dtype=np.float32,
+    )
+
+
+@scalar
+def free_fall_cost(error: float, velocity: float, gravity: float, duration: float) -> float:
+    """∫ (e + v τ - g τ²/2)² dτ over ``duration``, m² s: the cost of a load that falls freely."""
+    t = duration
+    return t * (
+        error * error
+        + t
+        * (
+            error * velocity
+            + t
+            * (
+                (velocity * velocity - error * gravity) / 3.0
+                + t * (-0.25 * velocity * gravity + t * 0.05 * gravity * gravity)
+            )
+        )
+    )
+
+
+@scalar
+def free_fall_peak(error: float, velocity: float, gravity: float, duration: float) -> float:
+    """Greatest \\|e + v τ - g τ²/2\\| over ``duration``, m."""
+    rise = velocity / gravity
+    rise = 0.0 if rise < 0.0 else (duration if rise > duration else rise)
+    top = abs(error + velocity * rise - 0.5 * gravity * rise * rise)
+    end = abs(error + velocity * duration - 0.5 * gravity * duration * duration)
+    return top if top > end else end
+
+
+@scalar
+def charge_parted(row: Any, episode_duration: float, lanes: int, j: int) -> None:
+    """Charge a row whose rope has parted with the free fall of its load until the episode's end, once.
+
+    So the return stays -Ω1 of the whole episode, and to lose the load is never the cheaper way out.
+    """
+    if row[at.PARTED * lanes + j] == 1.0 and row[at.CHARGED * lanes + j] == 0.0:
+        row[at.CHARGED * lanes + j] = 1.0
+        left = episode_duration - row[at.TIME * lanes + j]
+        left = left if left > 0.0 else 0.0
+        error = row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j]
+        velocity = row[(at.LOAD_VELOCITY + 2) * lanes + j]
+        gravity = row[at.GRAVITY * lanes + j]
+        cost = free_fall_cost(error, velocity, gravity, left)
+        row[at.STEP_COST * lanes + j] += cost
+        row[at.OMEGA1 * lanes + j] += cost
+        peak = free_fall_peak(error, velocity, gravity, left)
+        if peak > row[at.OMEGA2 * lanes + j]:
+            row[at.OMEGA2 * lanes + j] = peak
+
+
+@cache
+def report_kernel(lanes: int) -> Callable[..., None]:
+    """Kernel (blocks, episode duration, state (N, 14), results (N, RESULTS)) that reads the rows out."""
+    source: Any = source_digest()
+
+    @kernel
+    def report(blocks, episode_duration, state, results):  # type: ignore[no-untyped-def]
+        source  # noqa: B018
+        for i in range(state.shape[0]):
+            row = blocks[i // lanes]
+            j = i % lanes
+            charge_parted(row, episode_duration, lanes, j)
+            state[i, 0] = row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j]
+            state[i, 1] = row[(at.LOAD_VELOCITY + 2) * lanes + j]
+            state[i, 2] = row[at.LOAD_POSITION * lanes + j] - row[at.PULLEY * lanes + j]
+            state[i, 3] = row[(at.LOAD_POSITION + 1) * lanes + j] - row[(at.PULLEY + 1) * lanes + j]
+            state[i, 4] = row[at.LOAD_VELOCITY * lanes + j]
+            state[i, 5] = row[(at.LOAD_VELOCITY + 1) * lanes + j]
+            state[i, 6] = row[(at.PULLEY + 2) * lanes + j] - row[(at.PULLEY_ON_DECK + 2) * lanes + j]
+            state[i, 7] = row[(at.PULLEY + 5) * lanes + j]
+            state[i, 8] = row[(at.PULLEY + 8) * lanes + j]
+            state[i, 9] = row[at.DRUM_ANGLE * lanes + j]
+            state[i, 10] = row[at.DRUM_SPEED * lanes + j]
+            state[i, 11] = row[at.TENSION * lanes + j]
+            state[i, 12] = row[at.MASS * lanes + j]
+            state[i, 13] = (
+                row[at.FREE_LENGTH * lanes + j] + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
+            )
+            results[i, TIME] = row[at.TIME * lanes + j]
+            for k in range(3):
+                results[i, LOAD + k] = row[(at.LOAD_POSITION + k) * lanes + j]
+            results[i, TENSION] = row[at.TENSION * lanes + j]
+            results[i, SLACK] = row[at.SLACK * lanes + j]
+            results[i, OMEGA1] = row[at.OMEGA1 * lanes + j]
+            results[i, OMEGA2] = row[at.OMEGA2 * lanes + j]
+            results[i, COST] = row[at.STEP_COST * lanes + j]
+            results[i, PARTED] = row[at.PARTED * lanes + j]
+
+    return report  # type: ignore[no-any-return]
+
+
+def sensed_truth(state: npt.NDArray[np.float64], angles: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """True values of the sensors' channels, from the state (N, 14) and roll and pitch (N, 2): (N, channels)."""
+    columns = (state[:, 6], state[:, 7], angles[:, 0], angles[:, 1], state[:, 9], state[:, 10], state[:, 11], state[:, 0])
+    return np.stack(columns, axis=1)
