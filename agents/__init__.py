@@ -1,0 +1,1 @@
+"""Policies for AFrameHeave: optimised drives, feedback laws, learned agents, all behind one protocol."""

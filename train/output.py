@@ -1,0 +1,72 @@
+"""Output folders and files: nothing is overwritten unasked, nothing is left half-written."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from aframe_env.validation import InvalidValue
+
+REPORTED_PACKAGES = ("gymnasium", "stable-baselines3", "torch", "numpy", "scipy", "numba", "waveresponse")
+
+
+def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
+    """Let ``write`` fill a temporary file beside ``path``, then rename it: all or nothing."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        write(temporary)
+        temporary.chmod(0o644)
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, all or nothing."""
+    write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8") and None)
+
+
+def write_json(path: Path, data: Any) -> None:
+    """Write a JSON file, all or nothing; NaN is refused."""
+    write_text(path, json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def new_folder(path: Path, *, overwrite: bool = False) -> Path:
+    """Make an output folder; an existing one with something in it is refused unless ``overwrite``."""
+    if path.exists() and not path.is_dir():
+        raise InvalidValue(f"out = {str(path)!r}: is a file, must be a folder")
+    if path.is_dir() and any(path.iterdir()) and not overwrite:
+        raise InvalidValue(f"out = {str(path)!r}: exists and is not empty; choose another, or pass --overwrite")
+    path.mkdir(parents=True, exist_ok=True)
+    return path
+
+
+def versions() -> dict[str, str]:
+    """Versions of what a result depends on."""
+    return {
+        "aframe-heave": version("aframe-heave"),
+        "python": platform.python_version(),
+        **{name: version(name) for name in REPORTED_PACKAGES},
+    }
+
+
+@contextlib.contextmanager
+def user_errors() -> Iterator[None]:
+    """Turn bad input and a failing disk into one line on standard error and exit status 2."""
+    try:
+        yield
+    except (InvalidValue, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
