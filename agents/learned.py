@@ -1,0 +1,136 @@
+"""Learned agents: safetensors and JSON on disk, a ``Policy`` in memory. Nothing in a file is executed."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+from safetensors.torch import load as load_tensors
+from safetensors.torch import save as save_tensors
+
+from aframe_env.scenario import Scenario
+from aframe_env.sensors import Channel, Sensors
+from aframe_env.task import SENSED, STATE
+from aframe_env.validation import InvalidValue
+from agents.features import feature_names, features
+from agents.network import Actor
+from agents.policy import FloatArray, Knowledge
+
+FORMAT = 1
+WEIGHTS = "agent.safetensors"
+CARD = "agent.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class AgentCard:
+    """What must be known of an agent to use it, and to know where it came from."""
+
+    algorithm: str
+    observation: str
+    """"state" or "sensors"."""
+    sensors: dict[str, Any] | None
+    """The sensors that it was trained with."""
+    features: tuple[str, ...]
+    hidden: int
+    speed_limit: float
+    """Drum speed that an action of 1 stands for, rad/s."""
+    control_period: float
+    """s."""
+    seed: int
+    timesteps: int
+    versions: dict[str, str]
+    sha256: str
+    """Of the file of weights."""
+    format: int = FORMAT
+
+
+@dataclass
+class LearnedPolicy:
+    """An agent as a policy: deterministic, and the same on every batch size."""
+
+    actor: Actor
+    card: AgentCard
+    name: str = field(init=False)
+    knows: Knowledge = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.name = self.card.algorithm
+        self.knows = Knowledge.STATE if self.card.observation == "state" else Knowledge.SENSORS
+        self._quantities = STATE if self.card.observation == "state" else SENSED
+        expected = feature_names(self._quantities)
+        if self.card.features != expected:
+            raise InvalidValue(f"the agent's features are {self.card.features}, this version makes {expected}")
+
+    def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
+        """Begin N episodes; the agent looks at nothing of them."""
+        if abs(control_period - self.card.control_period) > 1e-9:
+            raise InvalidValue(
+                f"control_period = {control_period} s: the agent was trained for {self.card.control_period} s"
+            )
+
+    def act(self, observation: npt.NDArray[np.float32], time: float) -> FloatArray:
+        """Drum speed commands (N,) rad/s."""
+        with torch.no_grad():
+            share = self.actor(torch.from_numpy(features(observation, self._quantities)))
+        return self.card.speed_limit * share[:, 0].double().numpy()
+
+    def predict(self, observation: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+        """Action (1,) rad/s for one observation (K,) of the environment."""
+        return self.act(observation[None], 0.0).astype(np.float32)
+
+
+def serialise(actor: Actor) -> bytes:
+    """Weights as the bytes of a safetensors file."""
+    return save_tensors({k: v.contiguous() for k, v in actor.state_dict().items()})
+
+
+def digest(weights: bytes) -> str:
+    """sha256 of a file of weights."""
+    return hashlib.sha256(weights).hexdigest()
+
+
+def sensors_to_dict(sensors: Sensors | None) -> dict[str, Any] | None:
+    """Sensors as plain data."""
+    return None if sensors is None else asdict(sensors)
+
+
+def sensors_from_dict(data: dict[str, Any] | None) -> Sensors | None:
+    """Sensors from plain data."""
+    if data is None:
+        return None
+    return Sensors(**{k: Channel(**v) if isinstance(v, dict) else v for k, v in data.items()})
+
+
+def card_text(card: AgentCard) -> str:
+    """The card as JSON."""
+    return json.dumps(asdict(card), indent=2, ensure_ascii=False) + "\n"
+
+
+def load(folder: str | Path) -> LearnedPolicy:
+    """Load an agent from its folder. Raises InvalidValue where the files do not belong together."""
+    path = Path(folder)
+    try:
+        text = (path / CARD).read_text(encoding="utf-8")
+        weights = (path / WEIGHTS).read_bytes()
+    except OSError as error:
+        raise InvalidValue(f"no agent in {str(path)!r}: {error}") from error
+    try:
+        data = json.loads(text)
+        data["features"] = tuple(data["features"])
+        card = AgentCard(**data)
+    except (ValueError, TypeError, KeyError) as error:
+        raise InvalidValue(f"{path / CARD}: not an agent's card: {error}") from error
+    if card.format != FORMAT:
+        raise InvalidValue(f"{path / CARD}: format = {card.format!r}: this version reads format {FORMAT}")
+    if digest(weights) != card.sha256:
+        raise InvalidValue(f"{path / WEIGHTS}: does not match the sha256 in {CARD}: damaged or not its file")
+    actor = Actor(len(card.features), card.hidden)
+    actor.load_state_dict(load_tensors(weights))
+    return LearnedPolicy(actor, card)

@@ -1,0 +1,161 @@
+"""The bridge from the native vector environment to Stable-Baselines3, with what training needs on top.
+
+Actions are shares of the winch's speed limit; observations are features; the reward is the depth error's root mean
+square over the step in place of its square, so that its gradient does not vanish near zero and a small sea weighs
+as much as a large one; an episode is cut, with the value of its last state, where the load has drifted far off.
+None of this is in the environment, and evaluation has none of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+from stable_baselines3.common.vec_env import VecEnv
+
+from aframe_env import task
+from aframe_env.scenario import ScenarioSource
+from aframe_env.simulation import Simulation
+from agents.features import feature_names, features
+
+Float32Array = npt.NDArray[np.float32]
+
+
+class TrainingVecEnv(VecEnv):
+    """Rows of the task for a learner: SAME_STEP resets, infos only for the rows that finished."""
+
+    def __init__(
+        self,
+        rows: int,
+        *,
+        scenario: ScenarioSource | None,
+        observation: task.Observation,
+        control_period: float,
+        episode_duration: float,
+        horizon: float,
+        drift_limit: float,
+        reward_scale: float,
+        seed: int,
+    ) -> None:
+        """``horizon`` [s]: rows start anew after that time; ``drift_limit`` [m]: and where the load is so far off."""
+        self._simulation = Simulation(
+            rows,
+            scenario=scenario,
+            observation=observation,
+            control_period=control_period,
+            episode_duration=episode_duration,
+        )
+        self._horizon = max(1, round(min(horizon, episode_duration) / control_period))
+        self._drift_limit = drift_limit
+        self._reward_scale = reward_scale
+        self._speed_limit = float(self._simulation.action_space.high[0])
+        self._rng = np.random.default_rng(seed)
+        self._commands = np.zeros(rows)
+        self._actions = np.zeros((rows, 1), dtype=np.float32)
+        self._no_infos: list[dict[str, Any]] = [{} for _ in range(rows)]
+        names = feature_names(self._simulation.quantities)
+        super().__init__(
+            rows,
+            spaces.Box(-20.0, 20.0, (len(names),), np.float32),
+            spaces.Box(-1.0, 1.0, (1,), np.float32),
+        )
+        self._left = np.zeros(rows, dtype=np.int64)
+        self._return = np.zeros(rows)
+        self._length = np.zeros(rows, dtype=np.int64)
+        self._error_sum = 0.0
+        self._still_sum = 0.0
+
+    @property
+    def quantities(self) -> tuple[task.Quantity, ...]:
+        """What an observation of the environment consists of."""
+        return self._simulation.quantities
+
+    @property
+    def speed_limit(self) -> float:
+        """Drum speed that an action of 1 stands for, rad/s."""
+        return self._speed_limit
+
+    def take_reduction(self) -> float:
+        """Heave reduction over all steps since the last call, exploration included.
+
+        The pulley's heave stands for what the load of a still drum would do.
+        """
+        reduction = 1.0 - math.sqrt(self._error_sum / self._still_sum) if self._still_sum else 0.0
+        self._error_sum = self._still_sum = 0.0
+        return reduction
+
+    def reset(self) -> Float32Array:  # type: ignore[override]
+        """Start all rows at random times of their horizon, so that they do not all end at once."""
+        self._restart(np.arange(self.num_envs))
+        self._left = self._rng.integers(1, self._horizon + 1, self.num_envs)
+        return self._features()
+
+    def step_async(self, actions: Float32Array) -> None:
+        """Take the actions (rows, 1), shares of the speed limit."""
+        self._commands = self._speed_limit * np.clip(actions[:, 0].astype(np.float64), -1.0, 1.0)
+
+    def step_wait(self):  # type: ignore[no-untyped-def]
+        """Advance, and restart the rows that finished."""
+        simulation = self._simulation
+        simulation.advance(self._commands)
+        cost = simulation.results[:, task.COST]
+        self._error_sum += float(cost.sum())
+        self._still_sum += float(np.square(simulation.state[:, 6]).sum()) * simulation.control_period
+        rewards = -self._reward_scale * np.sqrt(np.minimum(cost / simulation.control_period, 1e4))
+        self._return += rewards
+        self._length += 1
+        self._left -= 1
+        parted = simulation.results[:, task.PARTED] > 0.0
+        drifted = np.abs(simulation.state[:, 0]) > self._drift_limit
+        finished = parted | drifted | (self._left <= 0) | (simulation.steps >= simulation.episode_steps)
+        observations = self._features()
+        infos = self._no_infos
+        if finished.any():
+            infos = list(infos)
+            rows = np.flatnonzero(finished)
+            for i in rows.tolist():
+                infos[i] = {
+                    "terminal_observation": observations[i],
+                    "TimeLimit.truncated": not parted[i],
+                    "episode": {"r": float(self._return[i]), "l": int(self._length[i]), "t": 0.0},
+                }
+            self._restart(rows)
+            observations = self._features()
+        return observations, rewards.astype(np.float32), finished, infos
+
+    def _restart(self, rows: npt.NDArray[np.int64]) -> None:
+        self._simulation.reset_rows(rows, [self._simulation.draw(self._rng) for _ in rows])
+        self._left[rows] = self._horizon
+        self._return[rows] = 0.0
+        self._length[rows] = 0
+
+    def _features(self) -> Float32Array:
+        return features(self._simulation.observe(), self._simulation.quantities)
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """Attribute of the bridge, once for each row asked for."""
+        return [getattr(self, attr_name, None) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Rows have no attributes of their own to set."""
+        raise NotImplementedError("the rows of a native vector environment have no attributes of their own")
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Rows have no methods of their own to call."""
+        raise NotImplementedError("the rows of a native vector environment have no methods of their own")
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+        """Rows have no wrappers."""
+        return [False for _ in self._get_indices(indices)]
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Seed the draws of scenarios."""
+        self._rng = np.random.default_rng(seed)
+        return [seed] * self.num_envs

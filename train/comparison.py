@@ -1,0 +1,171 @@
+"""Compare policies on the same held-out scenarios: figures, table, picture."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.table import Table
+from scipy.stats import bootstrap
+
+from agents.policy import FloatArray, Knowledge
+from agents.rollout import Episodes
+from train.output import write_json, write_text
+
+CONFIDENCE = 0.95
+RESAMPLES = 4000
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A median with its bootstrap interval of 95 %."""
+
+    median: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, values: FloatArray) -> Interval:
+        """Median of the values (N,) over scenarios; the resampling is seeded."""
+        if len(values) < 2 or np.ptp(values) == 0.0:
+            middle = float(np.median(values))
+            return cls(middle, middle, middle)
+        interval = bootstrap(
+            (values,),
+            np.median,
+            confidence_level=CONFIDENCE,
+            n_resamples=RESAMPLES,
+            method="percentile",
+            rng=np.random.default_rng(0),
+        ).confidence_interval
+        return cls(float(np.median(values)), float(interval.low), float(interval.high))
+
+
+@dataclass(frozen=True)
+class Row:
+    """One policy's figures over its scenarios."""
+
+    policy: str
+    knows: str
+    scenarios: int
+    reduction: Interval
+    """Heave reduction 1 - RMS/RMS(drum still)."""
+    rms: Interval
+    """m."""
+    omega1: Interval
+    """m² s."""
+    omega2: Interval
+    """m."""
+    worst_reduction: float
+    worse_than_still: int
+    """Scenarios in which the policy is worse than the drum still."""
+    parted: int
+    """Scenarios in which the rope parted."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A policy's episodes, in the order of the scenarios; it may have run only the first few of them."""
+
+    policy: str
+    knows: Knowledge
+    episodes: Episodes
+
+
+def reductions(entry: Entry, still: Episodes) -> FloatArray:
+    """Heave reduction in each scenario: 1 - RMS/RMS(drum still)."""
+    rms = entry.episodes.rms
+    return 1.0 - rms / still.rms[: len(rms)]
+
+
+def compare(entries: Sequence[Entry], still: Episodes) -> list[Row]:
+    """Figures of every policy."""
+    rows = []
+    for entry in entries:
+        reduction = reductions(entry, still)
+        rows.append(
+            Row(
+                policy=entry.policy,
+                knows=entry.knows.value,
+                scenarios=len(reduction),
+                reduction=Interval.of(reduction),
+                rms=Interval.of(entry.episodes.rms),
+                omega1=Interval.of(entry.episodes.omega1),
+                omega2=Interval.of(entry.episodes.omega2),
+                worst_reduction=float(reduction.min()),
+                worse_than_still=int((reduction < 0.0).sum()),
+                parted=int(entry.episodes.parted.sum()),
+            )
+        )
+    return rows
+
+
+def _share(interval: Interval) -> str:
+    return f"{interval.median:.1%} [{interval.low:.1%}, {interval.high:.1%}]"
+
+
+def _metres(interval: Interval) -> str:
+    return f"{interval.median:.3f} [{interval.low:.3f}, {interval.high:.3f}]"
+
+
+HEADINGS = (
+    "policy",
+    "knows",
+    "scenarios",
+    "heave reduction",
+    "RMS error, m",
+    "Ω1, m² s",
+    "Ω2, m",
+    "worst reduction",
+    "worse than still",
+)
+
+
+def cells(row: Row) -> tuple[str, ...]:
+    """A row of the table, as text."""
+    return (
+        row.policy,
+        row.knows,
+        str(row.scenarios),
+        _share(row.reduction),
+        _metres(row.rms),
+        _metres(row.omega1),
+        _metres(row.omega2),
+        f"{row.worst_reduction:.1%}",
+        str(row.worse_than_still),
+    )
+
+
+def rich_table(rows: Sequence[Row]) -> Table:
+    """The table for a terminal."""
+    table = Table(title="Median over held-out scenarios [95 % bootstrap interval]")
+    for heading in HEADINGS:
+        table.add_column(heading)
+    for row in rows:
+        table.add_row(*cells(row))
+    return table
+
+
+def markdown_table(rows: Sequence[Row]) -> str:
+    """The table as Markdown."""
+    lines = ["| " + " | ".join(HEADINGS) + " |", "|" + " --- |" * len(HEADINGS)]
+    lines += ["| " + " | ".join(cells(row)) + " |" for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def write_comparison(folder: Path, rows: Sequence[Row], entries: Sequence[Entry]) -> None:
+    """Write comparison.json, comparison.md and, scenario by scenario, comparison.csv."""
+    write_json(folder / "comparison.json", [asdict(row) for row in rows])
+    write_text(folder / "comparison.md", markdown_table(rows))
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["policy", "scenario", "rms_m", "omega1_m2s", "omega2_m", "slack", "parted"])
+    for entry in entries:
+        e = entry.episodes
+        for i, values in enumerate(zip(e.rms, e.omega1, e.omega2, e.slack, e.parted, strict=True)):
+            writer.writerow([entry.policy, i, *(repr(float(v)) for v in values[:3]), *(int(v) for v in values[3:])])
+    write_text(folder / "comparison.csv", text.getvalue())
