@@ -1,0 +1,61 @@
+"""Pictures of the comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from agents.policy import Knowledge
+from agents.rollout import Episodes
+from train.comparison import Entry, reductions
+from train.output import write_atomically
+
+COLOURS = ("#8a8f98", "#0b6e99", "#d9822b", "#7a5195", "#c8553d", "#3a7d44", "#222222")
+
+
+def comparison_figure(path: Path, entries: Sequence[Entry], still: Episodes) -> None:
+    """Share of scenarios above a heave reduction; and one scenario's depth error over time."""
+    figure = Figure(figsize=(11.0, 7.6), layout="constrained")
+    profile, history, magnified = figure.subplot_mosaic([["p", "h"], ["p", "m"]], width_ratios=[1.0, 1.25]).values()
+    colour = {entry.policy: COLOURS[i % len(COLOURS)] for i, entry in enumerate(entries)}
+    for entry in entries:
+        reduction = np.sort(reductions(entry, still))
+        if entry.policy == entries[0].policy:
+            continue
+        share = 1.0 - np.arange(len(reduction)) / len(reduction)
+        # 1 - reduction on a logarithmic axis: from 0 to 90 % is as far as from 90 to 99 %.
+        left = np.maximum(1.0 - reduction, 1e-4)
+        style = "--" if entry.knows is Knowledge.FUTURE else "-"
+        profile.step(left, share, style, where="post", color=colour[entry.policy], lw=2, label=entry.policy)
+    profile.set_xscale("log")
+    profile.set_xlim(3.0, 1e-3)
+    ticks = [1.0, 0.5, 0.1, 0.05, 0.01, 0.002]
+    profile.set_xticks(ticks, [f"{1 - t:.1%}".replace(".0%", "%") for t in ticks])
+    profile.minorticks_off()
+    profile.set_xlabel("heave reduction 1 − RMS / RMS(drum still)")
+    profile.set_ylabel("share of scenarios with at least this reduction")
+    profile.set_ylim(0.0, 1.02)
+    profile.grid(alpha=0.3)
+    profile.legend(loc="lower left", fontsize=9)
+    profile.set_title("Held-out scenarios (dashed: knows the future)", fontsize=11)
+    example = int(np.argsort(still.rms)[len(still.rms) // 2])
+    shown = min(len(e.episodes.rms) for e in entries)
+    example = example if example < shown else int(np.argmax(still.rms[:shown]))
+    for axis in (history, magnified):
+        for entry in entries:
+            error = entry.episodes.error[example]
+            times = np.linspace(0.0, entry.episodes.duration, len(error))
+            style = "--" if entry.knows is Knowledge.FUTURE else "-"
+            axis.plot(times, error, style, color=colour[entry.policy], lw=1.3, label=entry.policy)
+        axis.set_ylabel("depth error, m")
+        axis.grid(alpha=0.3)
+        axis.set_xlim(0.0, still.duration)
+    limit = 1.15 * float(np.abs(still.error[example]).max())
+    history.set_ylim(-limit, limit)
+    history.set_title(f"Scenario {example}: depth error, and the same magnified", fontsize=11)
+    magnified.set_ylim(-0.06 * limit, 0.06 * limit)
+    magnified.set_xlabel("time, s")
+    write_atomically(path, lambda temporary: figure.savefig(temporary, dpi=130))
