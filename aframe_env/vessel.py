@@ -1,16 +1,177 @@
+"""A vessel: its motion in regular waves, from a table of response amplitude operators."""
+
 from __future__ import annotations
+
+import csv
+import math
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
+from importlib.resources import files
+from pathlib import Path
+
 import numpy as np
-@dataclass(frozen=True, eq=False)
+import numpy.typing as npt
+
+from aframe_env.validation import InvalidValue, require_vector
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+COLUMNS = (
+    "omega_rad_s",
+    "heading_deg",
+    *(f"{dof}_{part}" for dof in ("surge", "sway", "heave", "roll", "pitch", "yaw") for part in ("amp", "phase")),
+)
+
+# Ship axes (x forward, y to port) to the deck's (x aft, y to starboard): half a turn about z.
+_TO_DECK = np.array([-1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
+# The mirror image in the centreplane.
+_MIRROR = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Vessel:
+    """Motion response of a ship in regular waves.
+
+    Ship axes: x forward, y to port, z up, origin midships on the waterline. A wave with the elevation
+    Re(a exp(iωt)) at the reference point, travelling towards heading β (from the bow towards port: 0 following sea,
+    π head sea), moves the reference point by Re(a response exp(iωt)).
+    """
+
     name: str
-    frequencies: np.ndarray
-    headings: np.ndarray
-    deck_response: np.ndarray
-    @staticmethod
-    @cache
-    def supply():
-        f=np.linspace(.1,2.5,40); h=np.linspace(0,2*np.pi,25)
-        r=np.zeros((40,25,6),complex); r[:,:,2]=(1/(1+(f/1.0)**6))[:,None]; r[:,:,0]=1j*r[:,:,2]*np.cos(h);r[:,:,4]=.3*1j*r[:,:,2]*(f**2/9.81)[:,None]*np.cos(h)
-        return Vessel('tmp',f,h,r)
+    frequencies: FloatArray
+    """(F,) rad/s, rising."""
+    headings: FloatArray
+    """(D,) rad, rising from 0 to 2π."""
+    response: ComplexArray
+    """(F, D, 6) surge, sway, heave [m/m], roll, pitch, yaw [rad/m] of the reference point."""
+    reference_point: tuple[float, float, float]
+    """m, in ship axes."""
+    deck_position: tuple[float, float, float] = (-40.0, 0.0, 5.0)
+    """Origin of the deck frame {D}, midway between the A-frame's feet, m, in ship axes: at the stern."""
+
+    def __post_init__(self) -> None:
+        require_vector("reference_point", self.reference_point, "m")
+        require_vector("deck_position", self.deck_position, "m")
+        shape = (len(self.frequencies), len(self.headings), 6)
+        if self.response.shape != shape:
+            raise InvalidValue(f"response of shape {self.response.shape}: must be {shape}")
+
+    @classmethod
+    def from_csv(cls, path: str | Path, *, deck_position: tuple[float, float, float] | None = None) -> Vessel:
+        """Read a vessel from a CSV file.
+
+        Comment lines start with ``#``; ``# title: NAME`` and ``# reference_point_m: x, y, z`` are read (the origin,
+        where the latter is missing). Then the columns ``omega_rad_s, heading_deg, surge_amp, surge_phase, ...,
+        yaw_amp, yaw_phase``: amplitudes in m/m and rad/m, phases (lead) in rad, conventions as above. Every
+        combination of frequency and heading must be there; headings from 0 to 180° (the rest is then the mirror
+        image) or to 360°, at steps of 45° at the most.
+        """
+        path = Path(path)
+        try:
+            lines = path.read_text(encoding="utf-8").splitlines()
+        except (OSError, UnicodeDecodeError) as error:
+            raise InvalidValue(f"vessel {str(path)!r}: cannot be read: {error}") from error
+        name, reference = path.stem, (0.0, 0.0, 0.0)
+        rows: list[list[float]] = []
+        header_seen = False
+        for number, line in enumerate(lines, start=1):
+            where = f"{path}, line {number}"
+            if line.startswith("#"):
+                key, _, value = line[1:].partition(":")
+                if key.strip() == "title":
+                    name = value.strip()
+                elif key.strip() == "reference_point_m":
+                    point = [_number(item, where, "reference_point_m") for item in value.split(",")]
+                    if len(point) != 3:
+                        raise InvalidValue(f"{where}: reference_point_m: must be three numbers in m")
+                    reference = (point[0], point[1], point[2])
+            elif line.strip():
+                cells = next(csv.reader([line]))
+                if not header_seen:
+                    if tuple(cell.strip() for cell in cells) != COLUMNS:
+                        raise InvalidValue(f"{where}: the columns must be {','.join(COLUMNS)}")
+                    header_seen = True
+                    continue
+                if len(cells) != len(COLUMNS):
+                    raise InvalidValue(f"{where}: {len(cells)} columns: must be {len(COLUMNS)}")
+                row = [_number(cell, where, column) for cell, column in zip(cells, COLUMNS, strict=True)]
+                _check_row(row, where)
+                rows.append(row)
+        if not rows:
+            raise InvalidValue(f"vessel {str(path)!r}: has no data")
+        frequencies, headings, response = _grid(np.array(rows), path)
+        vessel = cls(
+            name=name, frequencies=frequencies, headings=headings, response=response, reference_point=reference
+        )
+        if deck_position is None:
+            return vessel
+        return cls(**{**vars(vessel), "deck_position": deck_position})
+
+    @classmethod
+    def supply(cls) -> Vessel:
+        """Return the default vessel: an 83 m supply ship, computed by ``train.vessel``."""
+        return _supply()
+
+    def response_at(self, position: tuple[float, float, float]) -> ComplexArray:
+        """Response (F, D, 6) of another point of the ship [m, in ship axes], for small angles.
+
+        The wave's elevation stays that at the reference point.
+        """
+        lever = np.asarray(position) - np.asarray(self.reference_point)
+        moved = self.response.copy()
+        moved[..., :3] += np.cross(self.response[..., 3:], lever)
+        return moved
+
+    @cached_property
+    def deck_response(self) -> ComplexArray:
+        """Response (F, D, 6) of the deck frame {D}: x aft, y to starboard, z up."""
+        return np.ascontiguousarray(self.response_at(self.deck_position) * _TO_DECK)
+
+
+@cache
+def _supply() -> Vessel:
+    return Vessel.from_csv(Path(str(files("aframe_env") / "data" / "supply_vessel.csv")))
+
+
+def _number(text: str, where: str, name: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise InvalidValue(f"{where}: {name} = {text.strip()!r}: must be a number") from None
+    if not math.isfinite(value):
+        raise InvalidValue(f"{where}: {name} = {text.strip()!r}: must be finite")
+    return value
+
+
+def _check_row(row: list[float], where: str) -> None:
+    if row[0] <= 0.0:
+        raise InvalidValue(f"{where}: omega_rad_s = {row[0]:g} rad/s: must be above 0")
+    if not 0.0 <= row[1] <= 360.0:
+        raise InvalidValue(f"{where}: heading_deg = {row[1]:g}°: must be in [0, 360]")
+    for column, value in zip(COLUMNS[2::2], row[2::2], strict=True):
+        if value < 0.0:
+            raise InvalidValue(f"{where}: {column} = {value:g}: must not be negative")
+
+
+def _grid(rows: FloatArray, path: Path) -> tuple[FloatArray, FloatArray, ComplexArray]:
+    """Frequencies, headings over the full circle, response, from the rows of a file."""
+    frequencies, degrees = np.unique(rows[:, 0]), np.unique(rows[:, 1])
+    if len(frequencies) < 2 or len(rows) != len(frequencies) * len(degrees):
+        raise InvalidValue(
+            f"{path}: {len(rows)} rows for {len(frequencies)} frequencies and {len(degrees)} headings: every "
+            "combination must be there once, with at least 2 frequencies"
+        )
+    ordered = rows[np.lexsort((rows[:, 1], rows[:, 0]))].reshape(len(frequencies), len(degrees), -1)
+    if not np.array_equal(ordered[:, :, 1], np.broadcast_to(degrees, ordered.shape[:2])):
+        raise InvalidValue(f"{path}: a combination of frequency and heading is missing or there twice")
+    response = ordered[:, :, 2::2] * np.exp(1j * ordered[:, :, 3::2])
+    if degrees[0] == 0.0 and degrees[-1] == 180.0:
+        degrees = np.concatenate([degrees, 360.0 - degrees[-2::-1]])
+        response = np.concatenate([response, response[:, -2::-1] * _MIRROR], axis=1)
+    elif degrees[0] == 0.0 and degrees[-1] < 360.0:
+        degrees = np.concatenate([degrees, [360.0]])
+        response = np.concatenate([response, response[:, :1]], axis=1)
+    if degrees[0] != 0.0 or degrees[-1] != 360.0 or np.diff(degrees).max() > 45.0:
+        raise InvalidValue(f"{path}: headings must go from 0 to 180° or around, at steps of 45° at the most")
+    return frequencies, np.radians(degrees), np.ascontiguousarray(response)
