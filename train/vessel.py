@@ -63,7 +63,7 @@ class Options:
     """Panels along the hull."""
     waterlines: int = 8
     """Panels around half a section."""
-    frequencies: int = 45
+    frequencies: int = 46
     """Between 0.1 and 2.5 rad/s."""
     heading_step: int = 15
     """Degrees; must divide 180."""
@@ -76,7 +76,7 @@ class Options:
         require_number("roll_damping", self.roll_damping, "of critical", low=0.0, high=1.0)
         require_integer("stations", self.stations, low=8, high=400)
         require_integer("waterlines", self.waterlines, low=3, high=100)
-        require_integer("frequencies", self.frequencies, low=5, high=500)
+        require_integer("frequencies", self.frequencies, low=12, high=500)
         if self.heading_step < 1 or 180 % self.heading_step:
             raise InvalidValue(f"heading_step = {self.heading_step}°: must divide 180°")
 
@@ -158,8 +158,8 @@ def compute(options: Options, console: Console) -> tuple[FloatArray, FloatArray,
         f"{len(faces)} panels, displacement {mass:.4g} kg, LCB {buoyancy[0]:.2f} m, KG {height + options.draught:.2f} m, "
         f"GM_T {stiffness[3, 3] / (mass * GRAVITY):.3f} m"
     )
-    omega = 2.0 * math.pi / np.linspace(2.0 * math.pi / 0.2, 2.0 * math.pi / 2.5, options.frequencies - 4)
-    omega = np.concatenate([[0.1, 0.125, 0.15, 0.175], omega])
+    # Fine where ships respond, coarse where they hardly do.
+    omega = np.concatenate([np.linspace(0.1, 1.5, options.frequencies - 6), np.linspace(1.6, 2.5, 6)])
     heading = np.radians(np.arange(0.0, 180.1, options.heading_step))
     added = np.empty((len(omega), 6, 6))
     damping = np.empty((len(omega), 6, 6))
@@ -280,7 +280,7 @@ def draw(vessel: Vessel, other: Vessel | None, path: Path) -> None:
         axis.set_xlabel("period, s")
     axes[0, 0].legend(title="heading (180° = head sea)", fontsize=8, ncols=2)
     beside = f"; dotted: {other.name}" if other is not None else ""
-    figure.suptitle(f"Motion response of {vessel.name} at its centre of gravity{beside}")
+    figure.suptitle(f"Motion response: {vessel.name}, at its centre of gravity{beside}")
     write_atomically(path, lambda temporary: figure.savefig(temporary, dpi=130))
 
 
