@@ -1,0 +1,1 @@
+"""Active heave compensation of a load under an offshore A-frame crane."""
