@@ -1,8 +1,9 @@
 """Stand-alone runs of the full model: frame, rope, load and drum on a moving deck, eqs. (23)–(30).
 
-The frame's coordinates are those left by the constraints; frame, load and drum all step with average acceleration. In
-a step the rope's force at its end is found by iteration to convergence (no splitting): the frame answers a force at S
-through a constant 3 × 3 matrix, so that an iteration costs no solution of the frame.
+The frame's coordinates are those left by the constraints; frame, load and drum all step with average
+acceleration. In a step the rope's force at its end is found by iteration to convergence (no splitting): the
+frame answers a force at S through a constant 3 × 3 matrix, so that an iteration costs no solution of the
+frame.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from aframe_env.dynamics.rfem.chain import cross_matrix
 from aframe_env.dynamics.rfem.deck import DeckMotion, DeckStates, paper_motion
 from aframe_env.dynamics.rfem.history import FrameHistory
 from aframe_env.dynamics.rfem.integrator import AverageAcceleration
-from aframe_env.dynamics.rfem.model import CarriedInertia, FrameModel, frame_model
+from aframe_env.dynamics.rfem.model import CarriedInertia, FrameModel, apply_blocks, frame_model
 from aframe_env.dynamics.rfem.rope_law import RopeForce, rope_force
 from aframe_env.dynamics.rfem.statics import solve
 from aframe_env.validation import InvalidValue, require_choice, require_number
@@ -132,9 +133,11 @@ class DynamicResult:
 class _Carriage:
     """The deck at every step, in the shape that the frame's axes {F} want."""
 
-    def __init__(self, model: FrameModel, deck: DeckMotion, times: Array) -> None:
+    def __init__(self, crane: Crane, model: FrameModel, deck: DeckMotion, times: Array) -> None:
         self.states = deck.states(times)
         states, to_deck = self.states, model.to_deck
+        self.pulley_place, self.pulley_speed = _carried_point(states, np.array(crane.pulley_position))
+        self.drum_place, self.drum_speed = _carried_point(states, np.array(crane.drum_position))
         self.rotation = states.rotation @ to_deck
         """{F} → base frame, (k, 3, 3)."""
         gravity = np.array([0.0, 0.0, -GRAVITY])
@@ -147,6 +150,13 @@ class _Carriage:
         self.coriolis = 2.0 * skew
 
 
+def _carried_point(states: DeckStates, place: Array) -> tuple[Array, Array]:
+    """Place and velocity in the base frame, (k, 3) each, of a point fixed at ``place`` in {D}."""
+    position = states.position + states.rotation @ place
+    turning = np.cross(states.angular_velocity, place)
+    return position, states.velocity + np.einsum("kij,kj->ki", states.rotation, turning)
+
+
 class _Run:
     """State and constants of one run; :func:`simulate` drives it."""
 
@@ -155,9 +165,10 @@ class _Run:
         self.crane, self.case, self.model, self.inner = crane, case, model, inner
         self.outputs = max(1, round(case.duration / case.output_interval))
         self.scheme = AverageAcceleration(model, case.output_interval / inner)
-        self.times = self.scheme.step * np.arange(self.outputs * inner + 1)
-        self.carriage = _Carriage(model, case.deck, self.times)
+        self.times: Array = self.scheme.step * np.arange(self.outputs * inner + 1, dtype=np.float64)
+        self.carriage = _Carriage(crane, model, case.deck, self.times)
         self.inertia = CarriedInertia(model)
+        self.turned = (-1, np.zeros(0), np.zeros(0), np.zeros(0))
         self.uniform = model.uniform_field()
         self.reduced_uniform = (self.uniform.T @ model.constraints.basis).T
         self.coupling = self.scheme.pulley @ self.scheme.response
@@ -173,6 +184,7 @@ class _Run:
         self.load, self.load_velocity, self.load_acceleration = (np.zeros(3) for _ in range(3))
         self.angle, self.rate, self.angular_acceleration = 0.0, 0.0, 0.0
         self.force = np.zeros(3)
+        self.last_force, self.last_acceleration = np.zeros(3), np.zeros(3)
         self.rope = RopeForce(0.0, 0.0, 0.0)
 
     def start(self) -> None:
@@ -204,6 +216,7 @@ class _Run:
             self.angle, self.rate = self.case.drum.angle(0.0), self.case.drum.rate(0.0)
         at_rest = (position * model.mass) @ model.constraints.basis
         self._evaluate(0, scheme.pulley @ at_rest, np.zeros(3))
+        self.last_force, self.last_acceleration = self.force, self.load_acceleration
         loads = self._carried(0, at_rest, np.zeros_like(at_rest)) + self.force @ scheme.pulley
         scheme.start(at_rest, np.zeros_like(at_rest), loads)
 
@@ -218,44 +231,52 @@ class _Run:
 
     def inertial(self, index: int, position: Array, velocity: Array) -> Array:
         """e_F of a turning deck beyond the uniform field, (n,)."""
-        carriage, inertia = self.carriage, self.inertia
-        turning = carriage.turning[index]
-        return np.asarray(
-            inertia.constant(np.zeros(3), turning)
-            + inertia.coupled(turning, position)
-            + inertia.coupled(carriage.coriolis[index], velocity)
-        )
+        if index != self.turned[0]:
+            carriage, inertia = self.carriage, self.inertia
+            turning = carriage.turning[index]
+            self.turned = (
+                index,
+                inertia.constant(np.zeros(3), turning),
+                inertia.blocks(turning),
+                inertia.blocks(carriage.coriolis[index]),
+            )
+        _, constant, centrifugal, coriolis = self.turned
+        return constant + apply_blocks(centrifugal, position) + apply_blocks(coriolis, velocity)
 
     def _evaluate(self, index: int, deflection: Array, deflection_rate: Array) -> None:
-        """Rope force at S (along {F}), accelerations of load and drum, for the present state of load and drum."""
-        case, crane, carriage = self.case, self.crane, self.carriage
-        states = carriage.states
+        """Rope force at S (along {F}), accelerations of load and drum, for the present state of load and
+        drum."""
+        case, carriage = self.case, self.carriage
         turn = carriage.rotation[index]
-        arm = np.array([0.0, 0.0, crane.frame.height]) + deflection
-        spin = carriage.spin[index]
-        place = states.position[index] + turn @ arm
-        speed = states.velocity[index] + turn @ (_cross(spin, arm) + deflection_rate)
-        drum_arm = self.model.to_deck.T @ np.array(crane.drum_position)
-        drum = states.position[index] + turn @ drum_arm
-        drum_speed = states.velocity[index] + turn @ _cross(spin, drum_arm)
-        to_load, to_drum = self.load - place, drum - place
-        hanging, inboard = math.sqrt(to_load @ to_load), math.sqrt(to_drum @ to_drum)
-        to_load, to_drum = to_load / hanging, to_drum / inboard
+        moving = deflection_rate
+        if carriage.turns:
+            moving = moving + np.cross(carriage.spin[index], deflection)
+        sx, sy, sz = (carriage.pulley_place[index] + turn @ deflection).tolist()
+        ux, uy, uz = (carriage.pulley_speed[index] + turn @ moving).tolist()
+        # Plain numbers: this runs several times a step, and small arrays would cost more than the frame.
+        lx, ly, lz = self.load.tolist()
+        vx, vy, vz = self.load_velocity.tolist()
+        hx, hy, hz = carriage.drum_place[index].tolist()
+        wx, wy, wz = carriage.drum_speed[index].tolist()
+        lx, ly, lz, hx, hy, hz = lx - sx, ly - sy, lz - sz, hx - sx, hy - sy, hz - sz
+        hanging, inboard = math.sqrt(lx * lx + ly * ly + lz * lz), math.sqrt(hx * hx + hy * hy + hz * hz)
+        lx, ly, lz = lx / hanging, ly / hanging, lz / hanging
+        hx, hy, hz = hx / inboard, hy / inboard, hz / inboard
         length = self.unstretched + self.radius * self.angle
+        hanging_rate = lx * (vx - ux) + ly * (vy - uy) + lz * (vz - uz)
+        inboard_rate = hx * (wx - ux) + hy * (wy - uy) + hz * (wz - uz)
         self.rope = rope_force(
             geometric=hanging + inboard,
-            geometric_rate=float(
-                to_load @ (self.load_velocity - speed) + to_drum @ (drum_speed - speed)
-            ),
+            geometric_rate=hanging_rate + inboard_rate,
             unstretched=length,
             unstretched_rate=self.radius * self.rate,
-            stiffness=crane.rope.axial_stiffness / length,
+            stiffness=self.crane.rope.axial_stiffness / length,
             damping=case.rope_damping,
         )
         tension = self.rope.tension
-        self.force = (tension * (to_load + to_drum)) @ turn
-        self.load_acceleration = -tension / case.load_mass * to_load
-        self.load_acceleration[2] -= GRAVITY
+        self.force = tension * np.array([lx + hx, ly + hy, lz + hz]) @ turn
+        pull = tension / case.load_mass
+        self.load_acceleration = np.array([-pull * lx, -pull * ly, -pull * lz - GRAVITY])
         if isinstance(case.drum, DrivenDrum):
             torque = case.drum.torque(float(self.times[index]), self.angle, self.rate)
             self.angular_acceleration = (torque + self.pull(self.rope) * self.radius) / case.drum.inertia
@@ -278,6 +299,12 @@ class _Run:
             self.angle, self.rate = drum.angle(time), drum.rate(time)
         place, speed = scheme.predict()
         acceleration = scheme.acceleration
+        tolerance = 1e-11 * self.case.load_mass * GRAVITY
+        # Begin the iteration where force and load go on as they did in the last step.
+        force, pulled = self.force, self.load_acceleration
+        self.force = 2.0 * force - self.last_force
+        self.load_acceleration = 2.0 * pulled - self.last_acceleration
+        self.last_force, self.last_acceleration = force, pulled
         for _ in range(30 if self.carriage.turns else 1):
             free = scheme.solve(self._carried(index, *scheme.ends(acceleration)))
             own = scheme.pulley @ free
@@ -292,7 +319,7 @@ class _Run:
                     self.angle = angle + quarter * self.angular_acceleration
                     self.rate = rate + half * self.angular_acceleration
                 self._evaluate(index, base + quarter * answer, base_rate + half * answer)
-                if np.max(np.abs(self.force - before)) <= 1e-11 * self.case.load_mass * GRAVITY:
+                if float(abs(self.force - before).max()) <= tolerance:
                     break
             else:
                 raise ArithmeticError(
@@ -306,13 +333,9 @@ class _Run:
         scheme.finish(acceleration)
 
 
-def _cross(a: Array, b: Array) -> Array:
-    return np.array(
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    )
-
-
-def simulate(crane: Crane, case: DynamicCase | None = None, *, model: FrameModel | None = None) -> DynamicResult:
+def simulate(
+    crane: Crane, case: DynamicCase | None = None, *, model: FrameModel | None = None
+) -> DynamicResult:
     """Run the full model with rope, load and drum on a moving deck.
 
     Args:

@@ -39,7 +39,7 @@ class AverageAcceleration:
         system = np.eye(size) + 0.5 * step * model.reduced_damping + 0.25 * step**2 * model.reduced_stiffness
         self._factor = BandedCholesky(system)
         self.pulley = model.pulley @ self._basis
-        self.response = self._factor.solve(self.pulley.T)
+        self.response = np.ascontiguousarray(self._factor.solve(self.pulley.T))
         self.position, self.velocity, self.acceleration = (np.zeros(size) for _ in range(3))
         self._place, self._rate, self._elastic = (np.zeros(size) for _ in range(3))
 

@@ -218,10 +218,14 @@ class CarriedInertia:
         """e_F of the undeformed frame, (n,): ``acceleration`` w (3,), m/s², ``turning`` W (3, 3), 1/s²."""
         return np.asarray(self._uniform @ acceleration + np.einsum("aef,ef->a", self._constant, turning))
 
-    def coupled(self, turning: Array, displacement: Array) -> Array:
-        """E(W) applied to q, or, with 2 Ω×, to q̇; (n,)."""
-        blocks = np.tensordot(self._blocks, turning, axes=2)
-        return np.asarray(np.einsum("bij,bj->bi", blocks, displacement.reshape(-1, 6)).ravel())
+    def blocks(self, turning: Array) -> Array:
+        """E(W), one 6 × 6 block a body: (rfes, 6, 6)."""
+        return np.tensordot(self._blocks, turning, axes=2)
+
+
+def apply_blocks(blocks: Array, displacement: Array) -> Array:
+    """Block diagonal matrix (rfes, 6, 6) times q or q̇, (n,)."""
+    return np.asarray((blocks @ displacement.reshape(-1, 6, 1)).ravel())
 
 
 def frame_model(

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 
 def release_factor(time: float, ramp: float) -> float:
-    """Share of the load that is left at ``time`` > 0: half a cosine over ``ramp``, s; 0 at once if that is 0."""
+    """Share of the load that is left at ``time`` > 0: half a cosine over ``ramp``, s; 0 at once if that is
+    0."""
     if time >= ramp:
         return 0.0
     return 0.5 * (1.0 + math.cos(math.pi * time / ramp))
@@ -67,7 +68,7 @@ def release(
     factor = 1.0 if ramp > 0.0 else 0.0
     scheme.start(start, np.zeros_like(start), reduced_weight + factor * reduced_load)
 
-    times = output_interval * np.arange(outputs + 1)
+    times = output_interval * np.arange(outputs + 1, dtype=np.float64)
     coordinates = np.zeros((outputs + 1, 2, start.size))
     factors = np.zeros(outputs + 1)
     coordinates[0, 0], factors[0] = start, factor
@@ -82,7 +83,7 @@ def release(
     down = frame.to_deck.T @ DOWN * (GRAVITY if case.own_weight else 0.0)
     return FrameHistory(
         model=frame,
-        time=times,
+        time=np.asarray(times),
         position=history[:, 0],
         velocity=history[:, 1],
         force=weight + np.outer(factors, load),
