@@ -92,18 +92,26 @@ def constrain(frame: Frame, structure: Structure) -> Constraints:
     return Constraints(
         names=tuple(names),
         matrix=matrix,
-        basis=_basis(matrix, mass),
+        basis=local_basis(matrix, mass),
         particular=scaled.T @ weight,
         weight=np.asarray(weight, dtype=np.float64),
     )
 
 
-def _basis(matrix: Array, mass: Array) -> Array:
-    """Local M-orthonormal null-space basis: bodies that share a constraint form a group, each solved by
-    itself."""
+def local_basis(matrix: Array, mass: Array, coordinates: int = 6) -> Array:
+    """Local M-orthonormal null-space basis: bodies that share a constraint form a group, solved by itself.
+
+    Args:
+        matrix: C, (r, n).
+        mass: Diagonal of M, (n,).
+        coordinates: Of each body; n is a multiple of it.
+
+    Returns:
+        Z, (n, n − r), with C Z = 0 and ZᵀMZ = 1.
+    """
     root = np.sqrt(mass)
-    bodies = mass.size // 6
-    touches = np.abs(matrix).reshape(matrix.shape[0], bodies, 6).sum(axis=2) > 0.0
+    bodies = mass.size // coordinates
+    touches = np.abs(matrix).reshape(matrix.shape[0], bodies, coordinates).sum(axis=2) > 0.0
     group = list(range(bodies))
     for row in touches:
         members = np.flatnonzero(row)
@@ -111,7 +119,7 @@ def _basis(matrix: Array, mass: Array) -> Array:
         group = [min(merged) if label in merged else label for label in group]
     columns = []
     for label in sorted(set(group)):
-        inside = np.repeat(np.array(group) == label, 6)
+        inside = np.repeat(np.array(group) == label, coordinates)
         own = matrix[np.abs(matrix[:, inside]).sum(axis=1) > 0.0][:, inside]
         local = null_space(own / root[inside]) if own.size else np.eye(int(inside.sum()))
         block = np.zeros((mass.size, local.shape[1]))
