@@ -64,7 +64,7 @@ def _views(axes: tuple[Axes, Axes], frame: FrameModel, position: Array, factor: 
     rest, moved = _moved(frame, position, 0.0), _moved(frame, position, factor)
     for axis, across, label in ((axes[0], 1, "y, m"), (axes[1], 0, "x (outboard), m")):
         axis.plot(rest[:, across], rest[:, 2], color="0.7", label="undeformed")
-        axis.plot(moved[:, across], moved[:, 2], color=HERE, label=f"deformed × {factor:g}")
+        axis.plot(moved[:, across], moved[:, 2], color=HERE, label="deformed, enlarged")
         axis.set_xlabel(label)
         axis.set_ylabel("z, m")
         axis.set_aspect("equal")
@@ -85,7 +85,8 @@ def deformed_frame() -> Figure:
         grid[1, column].plot(target[0], target[2], "x", color=REFERENCE)
         height = result.displacement["S"][2] * 1e3
         grid[0, column].set_title(
-            f"{name}: u_S,z = {height:.3f} mm (reference {deflection[2] * 1e3:.3f})", fontsize=10
+            f"{name} (× {factor:g}): u_S,z = {height:.3f} mm (reference {deflection[2] * 1e3:.3f})",
+            fontsize=9,
         )
     grid[0, 0].legend(fontsize=8, loc="center")
     return figure

@@ -299,7 +299,8 @@ class _Run:
             self.angle, self.rate = drum.angle(time), drum.rate(time)
         place, speed = scheme.predict()
         acceleration = scheme.acceleration
-        tolerance = 1e-11 * self.case.load_mass * GRAVITY
+        # c times the rounding of a length is some 1e-16 E_R F_R: ask for no more than that allows.
+        tolerance = 1e-11 * self.case.load_mass * GRAVITY + 1e-14 * self.crane.rope.axial_stiffness
         # Begin the iteration where force and load go on as they did in the last step.
         force, pulled = self.force, self.load_acceleration
         self.force = 2.0 * force - self.last_force

@@ -113,6 +113,10 @@ class SectionForces:
                 inside = segment.low - tiny <= cut.position <= segment.high + tiny
                 if self._index(segment) == cut.member and inside and found is None:
                     found = (index, list(body.segments[: number + 1]))
+                    # What a joint holds together (three beams) is one rigid part.
+                    for before, behind, _ in self._model.structure.joints:
+                        if behind == index:
+                            found = (before, [*self._model.structure.bodies[before].segments, *found[1]])
         if found is None:
             length = self._model.structure.springs[0].member.length
             raise ValueError(f"no rfe at {cut.position} m of member {cut.member} (right leg: 0 … {length} m)")

@@ -88,7 +88,11 @@ class StaticResult:
         members = members_of(model.frame)
         stations, offset = [], 0.0
         for index, member in enumerate(members):
-            cuts = [Cut(member=index, position=float(x)) for x in np.linspace(0.0, member.length, per_member)]
+            cuts = [
+                # At A_L before its reaction, as at A_R behind it.
+                Cut(member=index, position=float(x), behind_point=bool(x < member.length))
+                for x in np.linspace(0.0, member.length, per_member)
+            ]
             special = {"top beam": ["S"], "right leg": ["N_R"], "left leg": ["N_L"]}[member.name]
             for name in special:
                 where = _position(model, name)[1]
