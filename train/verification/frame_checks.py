@@ -188,7 +188,7 @@ def static_frame() -> list[Check]:
             worst = max(worst, *errors.values())
             result, target = Crane().static(case, model=frame).reference_case(), static_cases()[name]
             here, there = flat(result), flat(target)
-            for key in ("u_S_D.0", "u_S_D.2", "rot_BR_D.0", "rot_BR_D.1", "R_AR_D.1"):
+            for key in ("u_S_D.0", "u_S_D.2", "rot_BR_D.0", "rot_BR_D.1", "rot_BR_D.2", "R_AR_D.1"):
                 rows.append(_row(f"{name}: {key}", here[key], there[key]))
             for key in ("sec_before_NR.My", "sec_before_BR.Mz", "sec_before_S.My", "sec_before_S.Mz"):
                 rows.append(_row(f"{name}: {key}", here[key], there[key]))
@@ -203,9 +203,8 @@ def static_frame() -> list[Check]:
 
 
 def _row(name: str, here: float, there: float) -> Row:
-    return Row(
-        quantity=name, measured=f"{here:.7g}", reference=f"{there:.7g}", error=f"{here / there - 1.0:.4%}"
-    )
+    error = f"{here / there - 1.0:.4%}" if abs(there) > 1e-6 else ""
+    return Row(quantity=name, measured=f"{here:.7g}", reference=f"{there:.7g}", error=error)
 
 
 def _static_order() -> Check:
