@@ -1,16 +1,23 @@
 """The crane and its parts. Numbers in SI units; the defaults are the reference crane.
 
-Axes (right-handed): the deck frame {D} has its origin midway between the feet, x outboard (aft, for a frame at
-the stern), z up, and y to the left of somebody who looks outboard. The frame axes {F} share the origin and are
-turned about y by the luffing angle.
+Axes (right-handed): the deck frame {D} has its origin midway between the feet, x outboard (aft, for a frame
+at the stern), z up, and y to the left of somebody who looks outboard. The frame axes {F} share the origin
+and are turned about y by the luffing angle.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
+from aframe_env.section import FrameStructure
 from aframe_env.validation import InvalidValue, require_number, require_vector
+
+if TYPE_CHECKING:
+    from aframe_env.dynamics.rfem.model import FrameModel
+    from aframe_env.dynamics.rfem.modes import Modes
+    from aframe_env.dynamics.rfem.statics import LoadCase, StaticResult
 
 Vector = tuple[float, float, float]
 
@@ -32,12 +39,16 @@ class Frame:
     """Height of the servomotor ends N_R, N_L on the legs, along z of {F}, m."""
     servomotor_deck_x: float = -5.0
     """x coordinate in {D} of the servomotor ends C_R, C_L on the deck, m."""
+    structure: FrameStructure = field(default_factory=FrameStructure)
+    """Material, sections and servomotors (the full model alone reads them)."""
 
     def __post_init__(self) -> None:
         require_number("half_width", self.half_width, "m", low=0.0, low_open=True)
         require_number("height", self.height, "m", low=0.0, low_open=True)
         require_number("luffing_angle", self.luffing_angle, "rad", low=-1.4, high=1.4)
-        require_number("servomotor_height", self.servomotor_height, "m", low=0.0, high=self.height, low_open=True)
+        require_number(
+            "servomotor_height", self.servomotor_height, "m", low=0.0, high=self.height, low_open=True
+        )
         require_number("servomotor_deck_x", self.servomotor_deck_x, "m")
 
 
@@ -121,3 +132,20 @@ class Crane:
     def drum_to_pulley(self) -> float:
         """|SH| with the frame rigid, m."""
         return math.dist(self.pulley_position, self.drum_position)
+
+    def static(self, load_case: LoadCase, *, model: FrameModel | None = None) -> StaticResult:
+        """Deflections, reactions, servomotor tensions, section forces and stress under ``load_case``, full
+        model.
+
+        ``model`` (from :func:`aframe_env.dynamics.rfem.model.frame_model`) sets how finely the frame is
+        divided.
+        """
+        from aframe_env.dynamics.rfem.statics import static
+
+        return static(self, load_case, model=model)
+
+    def modes(self, count: int = 10, *, model: FrameModel | None = None) -> Modes:
+        """The ``count`` lowest natural frequencies (Hz) and shapes of the frame without load, full model."""
+        from aframe_env.dynamics.rfem.modes import frame_modes
+
+        return frame_modes(self, count, model=model)

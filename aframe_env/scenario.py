@@ -46,7 +46,9 @@ class Scenario:
         if not isinstance(self.crane, Crane):
             raise InvalidValue(f"crane = {self.crane!r}: must be a Crane")
         if not isinstance(self.motion, ComponentMotion | TabledMotion):
-            raise InvalidValue(f"motion = {self.motion!r}: must be a ship motion (HarmonicMotion, SeaMotion, ...)")
+            raise InvalidValue(
+                f"motion = {self.motion!r}: must be a ship motion (HarmonicMotion, SeaMotion, ...)"
+            )
         require_number("load_mass", self.load_mass, "kg", low=0.0, high=1e7, low_open=True)
         require_number("target_level", self.target_level, "m")
         require_number("rope_damping", self.rope_damping, "N s/m", low=0.0, high=1e8)
@@ -100,7 +102,9 @@ class Scenario:
         return math.sqrt(self.rope_stiffness / self.load_mass)
 
 
-def _require_range(name: str, value: Range, unit: str, low: float, high: float, low_open: bool = False) -> None:
+def _require_range(
+    name: str, value: Range, unit: str, low: float, high: float, low_open: bool = False
+) -> None:
     if isinstance(value, tuple):
         if len(value) != 2:
             raise InvalidValue(f"{name} = {value!r}: must be a number or a pair (low, high) in {unit}")

@@ -153,7 +153,8 @@ def report_kernel(lanes: int) -> Callable[..., None]:
             state[i, 11] = row[at.TENSION * lanes + j]
             state[i, 12] = row[at.MASS * lanes + j]
             state[i, 13] = (
-                row[at.FREE_LENGTH * lanes + j] + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
+                row[at.FREE_LENGTH * lanes + j]
+                + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
             )
             results[i, TIME] = row[at.TIME * lanes + j]
             for k in range(3):
@@ -170,5 +171,14 @@ def report_kernel(lanes: int) -> Callable[..., None]:
 
 def sensed_truth(state: npt.NDArray[np.float64], angles: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     """True values of the sensors' channels, from the state (N, 14) and roll and pitch (N, 2): (N, channels)."""
-    columns = (state[:, 6], state[:, 7], angles[:, 0], angles[:, 1], state[:, 9], state[:, 10], state[:, 11], state[:, 0])
+    columns = (
+        state[:, 6],
+        state[:, 7],
+        angles[:, 0],
+        angles[:, 1],
+        state[:, 9],
+        state[:, 10],
+        state[:, 11],
+        state[:, 0],
+    )
     return np.stack(columns, axis=1)

@@ -51,7 +51,9 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
     ) -> None:
         require_integer("num_envs", num_envs, low=1, high=2**24)
         if render_mode is not None:
-            raise InvalidValue(f"render_mode = {render_mode!r}: the vector environment does not draw; use the scalar one")
+            raise InvalidValue(
+                f"render_mode = {render_mode!r}: the vector environment does not draw; use the scalar one"
+            )
         if max_episode_steps is not None:
             require_integer("max_episode_steps", max_episode_steps, low=1, high=2**31)
             episode_duration = max_episode_steps * control_period
@@ -112,7 +114,9 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         mask = self._reset_mask(options.pop("reset_mask", None))
         scenarios = self._scenario_option(options.pop("scenario", None))
         if options:
-            raise InvalidValue(f"options: unknown key {sorted(options)[0]!r}: must be 'scenario' or 'reset_mask'")
+            raise InvalidValue(
+                f"options: unknown key {sorted(options)[0]!r}: must be 'scenario' or 'reset_mask'"
+            )
         seeds = self._seed_list(seed)
         for index in np.flatnonzero(mask).tolist():
             if seeds[index] is not None:
@@ -148,7 +152,13 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
             final = self._finals(self._ended)
             self._restart(self._ended, None)
             self._ended = np.zeros(self.num_envs, dtype=np.bool_)
-        return simulation.observe(), rewards, terminations, truncations, {**self._infos(self._everything), **final}
+        return (
+            simulation.observe(),
+            rewards,
+            terminations,
+            truncations,
+            {**self._infos(self._everything), **final},
+        )
 
     def get_state(self) -> tuple[EnvState, ...]:
         """Return everything that the rows' further life depends on (not between an end and its reset step)."""
@@ -185,7 +195,9 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
     def _commands(self, actions: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
         commands = np.asarray(actions, dtype=np.float64)
         if commands.shape != (self.num_envs, 1):
-            raise InvalidValue(f"actions of shape {commands.shape}: must be of shape ({self.num_envs}, 1), rad/s")
+            raise InvalidValue(
+                f"actions of shape {commands.shape}: must be of shape ({self.num_envs}, 1), rad/s"
+            )
         commands = commands[:, 0]
         if not np.isfinite(commands).all():
             row = int(np.flatnonzero(~np.isfinite(commands))[0])
@@ -196,7 +208,9 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         if mask is None:
             return self._everything.copy()
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
-            raise InvalidValue(f"options['reset_mask'] = {mask!r}: must be a bool array of shape ({self.num_envs},)")
+            raise InvalidValue(
+                f"options['reset_mask'] = {mask!r}: must be a bool array of shape ({self.num_envs},)"
+            )
         if not mask.any():
             raise InvalidValue("options['reset_mask']: must select at least one row")
         return mask
@@ -205,7 +219,9 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         if option is None or isinstance(option, Scenario):
             return None if option is None else [option] * self.num_envs
         if not isinstance(option, Sequence) or len(option) != self.num_envs:
-            raise InvalidValue(f"options['scenario']: must be a Scenario or a sequence of {self.num_envs} of them")
+            raise InvalidValue(
+                f"options['scenario']: must be a Scenario or a sequence of {self.num_envs} of them"
+            )
         return option
 
     def _seed_list(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:

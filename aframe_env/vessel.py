@@ -20,7 +20,11 @@ ComplexArray = npt.NDArray[np.complex128]
 COLUMNS = (
     "omega_rad_s",
     "heading_deg",
-    *(f"{dof}_{part}" for dof in ("surge", "sway", "heave", "roll", "pitch", "yaw") for part in ("amp", "phase")),
+    *(
+        f"{dof}_{part}"
+        for dof in ("surge", "sway", "heave", "roll", "pitch", "yaw")
+        for part in ("amp", "phase")
+    ),
 )
 
 # Ship axes (x forward, y to port) to the deck's (x aft, y to starboard): half a turn about z.
@@ -102,7 +106,11 @@ class Vessel:
             raise InvalidValue(f"vessel {str(path)!r}: has no data")
         frequencies, headings, response = _grid(np.array(rows), path)
         vessel = cls(
-            name=name, frequencies=frequencies, headings=headings, response=response, reference_point=reference
+            name=name,
+            frequencies=frequencies,
+            headings=headings,
+            response=response,
+            reference_point=reference,
         )
         if deck_position is None:
             return vessel

@@ -62,7 +62,9 @@ def features(observation: npt.NDArray[np.float32], quantities: tuple[Quantity, .
         "load_velocity_z": 2.0 * column["load_velocity_z"] if "load_velocity_z" in column else None,
         "load_acceleration_z": 4.0 * excess,
         "pulley_velocity_z": column["pulley_velocity_z"],
-        "pulley_acceleration_z": column["pulley_acceleration_z"] if "pulley_acceleration_z" in column else None,
+        "pulley_acceleration_z": column["pulley_acceleration_z"]
+        if "pulley_acceleration_z" in column
+        else None,
         "drum_speed": 0.75 * column["drum_speed"],
         "stretch_deviation": 4.0 * excess * mass * GRAVITY * length / _TYPICAL_STIFFNESS,
         "pulley_heave": 0.5 * column["pulley_heave"],

@@ -66,7 +66,9 @@ class LearnedPolicy:
         self._quantities = STATE if self.card.observation == "state" else SENSED
         expected = feature_names(self._quantities)
         if self.card.features != expected:
-            raise InvalidValue(f"the agent's features are {self.card.features}, this version makes {expected}")
+            raise InvalidValue(
+                f"the agent's features are {self.card.features}, this version makes {expected}"
+            )
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes; the agent looks at nothing of them."""

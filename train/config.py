@@ -64,6 +64,8 @@ def parse(kind: type[T], description: str, args: Sequence[str] | None = None) ->
             del args[index : index + (1 if value else 2)]
             break
     epilog = description + "\n\n--config FILE.toml reads the options from a file; the rest overrides it."
-    return tyro.cli(kind, args=args, description=epilog, default=default) if default else tyro.cli(
-        kind, args=args, description=epilog
+    return (
+        tyro.cli(kind, args=args, description=epilog, default=default)
+        if default
+        else tyro.cli(kind, args=args, description=epilog)
     )

@@ -48,7 +48,9 @@ def new_folder(path: Path, *, overwrite: bool = False) -> Path:
     if path.exists() and not path.is_dir():
         raise InvalidValue(f"out = {str(path)!r}: is a file, must be a folder")
     if path.is_dir() and any(path.iterdir()) and not overwrite:
-        raise InvalidValue(f"out = {str(path)!r}: exists and is not empty; choose another, or pass --overwrite")
+        raise InvalidValue(
+            f"out = {str(path)!r}: exists and is not empty; choose another, or pass --overwrite"
+        )
     path.mkdir(parents=True, exist_ok=True)
     return path
 

@@ -21,7 +21,16 @@ from stable_baselines3.common.logger import configure
 from aframe_env.sensors import Sensors
 from aframe_env.validation import require_choice, require_integer, require_number
 from agents.features import feature_names
-from agents.learned import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, sensors_to_dict, serialise
+from agents.learned import (
+    CARD,
+    WEIGHTS,
+    AgentCard,
+    LearnedPolicy,
+    card_text,
+    digest,
+    sensors_to_dict,
+    serialise,
+)
 from train.actor_critic import TwoPathPolicy
 from train.bridge import TrainingVecEnv
 from train.config import parse, to_toml
@@ -194,7 +203,10 @@ def train(options: Options, console: Console) -> int:
     write_text(folder / "config.toml", to_toml(options))
     write_json(
         folder / "run.json",
-        {"command": shlex.join([Path(sys.executable).name, "-m", "train.ppo", *sys.argv[1:]]), "versions": versions()},
+        {
+            "command": shlex.join([Path(sys.executable).name, "-m", "train.ppo", *sys.argv[1:]]),
+            "versions": versions(),
+        },
     )
     console.print(f"run folder: {folder}")
     with console.status("compiling the engine (about half a minute at the very first start)"):

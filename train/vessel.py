@@ -102,7 +102,9 @@ def _section_fullness(options: Options) -> float:
     block = options.displacement / WATER_DENSITY / (options.length * options.beam * options.draught)
     section = block / waterplane
     if not 0.5 < section < 0.99:
-        raise InvalidValue(f"displacement = {options.displacement:g} kg: does not go with the hull's dimensions")
+        raise InvalidValue(
+            f"displacement = {options.displacement:g} kg: does not go with the hull's dimensions"
+        )
     return section / (1.0 - section)
 
 
@@ -167,7 +169,8 @@ def compute(options: Options, console: Console) -> tuple[FloatArray, FloatArray,
     solver = cpt.BEMSolver()
     for i, w in enumerate(track(omega, "solving", console=console)):
         problems = [
-            cpt.RadiationProblem(body=body, radiating_dof=dof, omega=w, rho=WATER_DENSITY, g=GRAVITY) for dof in DOFS
+            cpt.RadiationProblem(body=body, radiating_dof=dof, omega=w, rho=WATER_DENSITY, g=GRAVITY)
+            for dof in DOFS
         ]
         problems += [
             cpt.DiffractionProblem(body=body, wave_direction=b, omega=w, rho=WATER_DENSITY, g=GRAVITY)
@@ -177,8 +180,15 @@ def compute(options: Options, console: Console) -> tuple[FloatArray, FloatArray,
         order = {"influenced_dof": list(DOFS)}
         pair = {**order, "radiating_dof": list(DOFS)}
         # Capytaine's order of these two axes is (radiating, influenced).
-        added[i] = data["added_mass"].sel(pair).transpose("omega", "influenced_dof", "radiating_dof").values[0]
-        damping[i] = data["radiation_damping"].sel(pair).transpose("omega", "influenced_dof", "radiating_dof").values[0]
+        added[i] = (
+            data["added_mass"].sel(pair).transpose("omega", "influenced_dof", "radiating_dof").values[0]
+        )
+        damping[i] = (
+            data["radiation_damping"]
+            .sel(pair)
+            .transpose("omega", "influenced_dof", "radiating_dof")
+            .values[0]
+        )
         total = data["Froude_Krylov_force"] + data["diffraction_force"]
         force[i] = total.sel(order).transpose("omega", "wave_direction", "influenced_dof").values[0]
     viscous = _viscous_roll(omega, added[:, 3, 3], damping[:, 3, 3], inertia[3, 3], stiffness[3, 3], options)
@@ -210,7 +220,12 @@ def _hydrostatics(options: Options) -> tuple[float, FloatArray, float]:
 
 
 def _viscous_roll(
-    omega: FloatArray, added: FloatArray, damping: FloatArray, inertia: float, stiffness: float, options: Options
+    omega: FloatArray,
+    added: FloatArray,
+    damping: FloatArray,
+    inertia: float,
+    stiffness: float,
+    options: Options,
 ) -> float:
     """Damping to add, N m s: what potential theory lacks of the share of critical at the roll resonance."""
     resonance = math.sqrt(stiffness / (inertia + float(np.median(added))))
@@ -267,7 +282,14 @@ def draw(vessel: Vessel, other: Vessel | None, path: Path) -> None:
                 j = int(np.argmin(np.abs(source.headings - math.radians(angle))))
                 label = f"{angle}°" if source is vessel else None
                 period = 2.0 * math.pi / source.frequencies
-                axis.plot(period, scale * np.abs(source.response[:, j, dof]), style, color=colour, lw=1.6, label=label)
+                axis.plot(
+                    period,
+                    scale * np.abs(source.response[:, j, dof]),
+                    style,
+                    color=colour,
+                    lw=1.6,
+                    label=label,
+                )
         axis.set_title(f"{DOFS[dof].lower()}, {unit}", fontsize=11)
         axis.set_xlim(3.0, 20.0)
         axis.set_ylim(bottom=0.0)

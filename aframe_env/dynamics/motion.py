@@ -91,22 +91,38 @@ def read_record(row: Block, records: npt.NDArray[np.float64], lanes: int) -> Non
 def place_pulley(row: Block, lanes: int) -> None:
     """Apply the ramp to the deck's motion, and carry the pulley with the deck, eq. (38)."""
     for j in range(lanes):
-        r, dr, ddr = smooth_ramp(row[at.TIME * lanes + j], row[at.RAMP_RATE * lanes + j], row[at.RAMP_OFFSET * lanes + j])
+        r, dr, ddr = smooth_ramp(
+            row[at.TIME * lanes + j], row[at.RAMP_RATE * lanes + j], row[at.RAMP_OFFSET * lanes + j]
+        )
         for dof in range(6):
             q = row[(at.MOTION + dof) * lanes + j]
             dq = row[(at.MOTION + 6 + dof) * lanes + j]
             row[(at.MOTION + dof) * lanes + j] = r * q
             row[(at.MOTION + 6 + dof) * lanes + j] = r * dq + dr * q
-            row[(at.MOTION + 12 + dof) * lanes + j] = r * row[(at.MOTION + 12 + dof) * lanes + j] + 2.0 * dr * dq + ddr * q
+            row[(at.MOTION + 12 + dof) * lanes + j] = (
+                r * row[(at.MOTION + 12 + dof) * lanes + j] + 2.0 * dr * dq + ddr * q
+            )
     for j in range(lanes):
         x = row[at.PULLEY_ON_DECK * lanes + j]
         y = row[(at.PULLEY_ON_DECK + 1) * lanes + j]
         z = row[(at.PULLEY_ON_DECK + 2) * lanes + j]
-        angle, rate, acceleration = row[(at.MOTION + 3) * lanes + j], row[(at.MOTION + 9) * lanes + j], row[(at.MOTION + 15) * lanes + j]
+        angle, rate, acceleration = (
+            row[(at.MOTION + 3) * lanes + j],
+            row[(at.MOTION + 9) * lanes + j],
+            row[(at.MOTION + 15) * lanes + j],
+        )
         y, z, dy, dz, ddy, ddz = rotate_pair(y, z, 0.0, 0.0, 0.0, 0.0, angle, rate, acceleration)
-        angle, rate, acceleration = row[(at.MOTION + 4) * lanes + j], row[(at.MOTION + 10) * lanes + j], row[(at.MOTION + 16) * lanes + j]
+        angle, rate, acceleration = (
+            row[(at.MOTION + 4) * lanes + j],
+            row[(at.MOTION + 10) * lanes + j],
+            row[(at.MOTION + 16) * lanes + j],
+        )
         z, x, dz, dx, ddz, ddx = rotate_pair(z, x, dz, 0.0, ddz, 0.0, angle, rate, acceleration)
-        angle, rate, acceleration = row[(at.MOTION + 5) * lanes + j], row[(at.MOTION + 11) * lanes + j], row[(at.MOTION + 17) * lanes + j]
+        angle, rate, acceleration = (
+            row[(at.MOTION + 5) * lanes + j],
+            row[(at.MOTION + 11) * lanes + j],
+            row[(at.MOTION + 17) * lanes + j],
+        )
         x, y, dx, dy, ddx, ddy = rotate_pair(x, y, dx, dy, ddx, ddy, angle, rate, acceleration)
         row[at.PULLEY * lanes + j] = x + row[at.MOTION * lanes + j]
         row[(at.PULLEY + 1) * lanes + j] = y + row[(at.MOTION + 1) * lanes + j]
@@ -162,23 +178,53 @@ def advance_motion(row: Block, components: int, records: npt.NDArray[np.float64]
     for j in range(lanes):
         duration = row[at.CONTROL_PERIOD * lanes + j]
         p1, p2, p3 = row[at.PATH * lanes + j], row[(at.PATH + 1) * lanes + j], row[(at.PATH + 2) * lanes + j]
-        v1, v2, v3 = row[(at.PATH + 3) * lanes + j], row[(at.PATH + 4) * lanes + j], row[(at.PATH + 5) * lanes + j]
-        a1, a2, a3 = row[(at.PATH + 6) * lanes + j], row[(at.PATH + 7) * lanes + j], row[(at.PATH + 8) * lanes + j]
+        v1, v2, v3 = (
+            row[(at.PATH + 3) * lanes + j],
+            row[(at.PATH + 4) * lanes + j],
+            row[(at.PATH + 5) * lanes + j],
+        )
+        a1, a2, a3 = (
+            row[(at.PATH + 6) * lanes + j],
+            row[(at.PATH + 7) * lanes + j],
+            row[(at.PATH + 8) * lanes + j],
+        )
         x = quintic(
-            p1, v1, a1, row[at.PULLEY * lanes + j], row[(at.PULLEY + 3) * lanes + j], row[(at.PULLEY + 6) * lanes + j], duration
+            p1,
+            v1,
+            a1,
+            row[at.PULLEY * lanes + j],
+            row[(at.PULLEY + 3) * lanes + j],
+            row[(at.PULLEY + 6) * lanes + j],
+            duration,
         )
         y = quintic(
-            p2, v2, a2, row[(at.PULLEY + 1) * lanes + j], row[(at.PULLEY + 4) * lanes + j], row[(at.PULLEY + 7) * lanes + j], duration
+            p2,
+            v2,
+            a2,
+            row[(at.PULLEY + 1) * lanes + j],
+            row[(at.PULLEY + 4) * lanes + j],
+            row[(at.PULLEY + 7) * lanes + j],
+            duration,
         )
         z = quintic(
-            p3, v3, a3, row[(at.PULLEY + 2) * lanes + j], row[(at.PULLEY + 5) * lanes + j], row[(at.PULLEY + 8) * lanes + j], duration
+            p3,
+            v3,
+            a3,
+            row[(at.PULLEY + 2) * lanes + j],
+            row[(at.PULLEY + 5) * lanes + j],
+            row[(at.PULLEY + 8) * lanes + j],
+            duration,
         )
         for i in range(6):
             row[(at.PATH + i) * lanes + j] = x[i]
             row[(at.PATH + 6 + i) * lanes + j] = y[i]
             row[(at.PATH + 12 + i) * lanes + j] = z[i]
         row[at.TIP * lanes + j], row[(at.TIP + 1) * lanes + j], row[(at.TIP + 2) * lanes + j] = p1, p2, p3
-        row[(at.TIP + 3) * lanes + j], row[(at.TIP + 4) * lanes + j], row[(at.TIP + 5) * lanes + j] = v1, v2, v3
+        row[(at.TIP + 3) * lanes + j], row[(at.TIP + 4) * lanes + j], row[(at.TIP + 5) * lanes + j] = (
+            v1,
+            v2,
+            v3,
+        )
 
 
 @scalar

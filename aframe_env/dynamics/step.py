@@ -32,7 +32,11 @@ def plan_winch(row: Array, lanes: int) -> None:
         row[at.COMMAND * lanes + j] = command
         half_step = 0.5 * row[at.CONTROL_PERIOD * lanes + j] / row[at.SUBSTEPS * lanes + j]
         direction, ramp_time, error, first, error_there = plan(
-            command, row[at.DRUM_SPEED * lanes + j], row[at.MAX_ACCELERATION * lanes + j], row[at.LAG * lanes + j], half_step
+            command,
+            row[at.DRUM_SPEED * lanes + j],
+            row[at.MAX_ACCELERATION * lanes + j],
+            row[at.LAG * lanes + j],
+            half_step,
         )
         row[at.WINCH * lanes + j] = direction
         row[(at.WINCH + 1) * lanes + j] = ramp_time
@@ -63,17 +67,37 @@ def drum_at(row: Array, lanes: int, j: int, elapsed: float, error: float) -> tup
 
 
 @scalar
-def pulley_at(row: Array, lanes: int, j: int, elapsed: float) -> tuple[float, float, float, float, float, float]:
+def pulley_at(
+    row: Array, lanes: int, j: int, elapsed: float
+) -> tuple[float, float, float, float, float, float]:
     """Pulley position and velocity of lane j, ``elapsed`` s into the segment."""
     c = at.PATH
     s1, d1 = on_quintic(
-        row[c * lanes + j], row[(c + 1) * lanes + j], row[(c + 2) * lanes + j], row[(c + 3) * lanes + j], row[(c + 4) * lanes + j], row[(c + 5) * lanes + j], elapsed
+        row[c * lanes + j],
+        row[(c + 1) * lanes + j],
+        row[(c + 2) * lanes + j],
+        row[(c + 3) * lanes + j],
+        row[(c + 4) * lanes + j],
+        row[(c + 5) * lanes + j],
+        elapsed,
     )
     s2, d2 = on_quintic(
-        row[(c + 6) * lanes + j], row[(c + 7) * lanes + j], row[(c + 8) * lanes + j], row[(c + 9) * lanes + j], row[(c + 10) * lanes + j], row[(c + 11) * lanes + j], elapsed
+        row[(c + 6) * lanes + j],
+        row[(c + 7) * lanes + j],
+        row[(c + 8) * lanes + j],
+        row[(c + 9) * lanes + j],
+        row[(c + 10) * lanes + j],
+        row[(c + 11) * lanes + j],
+        elapsed,
     )
     s3, d3 = on_quintic(
-        row[(c + 12) * lanes + j], row[(c + 13) * lanes + j], row[(c + 14) * lanes + j], row[(c + 15) * lanes + j], row[(c + 16) * lanes + j], row[(c + 17) * lanes + j], elapsed
+        row[(c + 12) * lanes + j],
+        row[(c + 13) * lanes + j],
+        row[(c + 14) * lanes + j],
+        row[(c + 15) * lanes + j],
+        row[(c + 16) * lanes + j],
+        row[(c + 17) * lanes + j],
+        elapsed,
     )
     return s1, s2, s3, d1, d2, d3
 
@@ -95,7 +119,11 @@ def inner_step(row: Array, index: int, lanes: int) -> None:
         angle1, speed1 = drum_at(row, lanes, j, begin + 0.5 * full, error1)
         angle2, speed2 = drum_at(row, lanes, j, begin + full, error2)
         t1, t2, t3 = row[at.TIP * lanes + j], row[(at.TIP + 1) * lanes + j], row[(at.TIP + 2) * lanes + j]
-        t4, t5, t6 = row[(at.TIP + 3) * lanes + j], row[(at.TIP + 4) * lanes + j], row[(at.TIP + 5) * lanes + j]
+        t4, t5, t6 = (
+            row[(at.TIP + 3) * lanes + j],
+            row[(at.TIP + 4) * lanes + j],
+            row[(at.TIP + 5) * lanes + j],
+        )
         start = (t1, t2, t3, t4, t5, t6, free_length + radius * angle0, radius * speed0)
         m1, m2, m3, m4, m5, m6 = pulley_at(row, lanes, j, begin + 0.5 * full)
         middle = (m1, m2, m3, m4, m5, m6, free_length + radius * angle1, radius * speed1)
@@ -122,11 +150,21 @@ def inner_step(row: Array, index: int, lanes: int) -> None:
             row[at.MASS * lanes + j],
             row[at.GRAVITY * lanes + j],
         )
-        row[at.LOAD_POSITION * lanes + j], row[(at.LOAD_POSITION + 1) * lanes + j], row[(at.LOAD_POSITION + 2) * lanes + j] = x1, x2, x3
-        row[at.LOAD_VELOCITY * lanes + j], row[(at.LOAD_VELOCITY + 1) * lanes + j], row[(at.LOAD_VELOCITY + 2) * lanes + j] = v1, v2, v3
+        (
+            row[at.LOAD_POSITION * lanes + j],
+            row[(at.LOAD_POSITION + 1) * lanes + j],
+            row[(at.LOAD_POSITION + 2) * lanes + j],
+        ) = x1, x2, x3
+        (
+            row[at.LOAD_VELOCITY * lanes + j],
+            row[(at.LOAD_VELOCITY + 1) * lanes + j],
+            row[(at.LOAD_VELOCITY + 2) * lanes + j],
+        ) = v1, v2, v3
         row[at.STEP_COST * lanes + j] += cost
         deviation = abs(x3 - row[at.TARGET * lanes + j])
-        row[at.OMEGA2 * lanes + j] = deviation if deviation > row[at.OMEGA2 * lanes + j] else row[at.OMEGA2 * lanes + j]
+        row[at.OMEGA2 * lanes + j] = (
+            deviation if deviation > row[at.OMEGA2 * lanes + j] else row[at.OMEGA2 * lanes + j]
+        )
         row[(at.WINCH + 4) * lanes + j] = error2 if active else error0
         row[at.DRUM_ANGLE * lanes + j] = angle2 if active else angle0
         row[at.DRUM_SPEED * lanes + j] = speed2 if active else speed0
@@ -136,7 +174,9 @@ def inner_step(row: Array, index: int, lanes: int) -> None:
         row[(at.TIP + 3) * lanes + j] = e4 if active else t4
         row[(at.TIP + 4) * lanes + j] = e5 if active else t5
         row[(at.TIP + 5) * lanes + j] = e6 if active else t6
-        row[at.PEAK_TENSION * lanes + j] = peak if peak > row[at.PEAK_TENSION * lanes + j] else row[at.PEAK_TENSION * lanes + j]
+        row[at.PEAK_TENSION * lanes + j] = (
+            peak if peak > row[at.PEAK_TENSION * lanes + j] else row[at.PEAK_TENSION * lanes + j]
+        )
         row[at.SLACK * lanes + j] = 1.0 if peak <= 0.0 else row[at.SLACK * lanes + j]
         row[at.PARTED * lanes + j] = 1.0 if peak > row[at.BREAKING_LOAD * lanes + j] else parted
 
@@ -152,8 +192,12 @@ def measure_tension(row: Array, lanes: int) -> None:
         w2 = row[(at.PULLEY + 4) * lanes + j] - row[(at.LOAD_VELOCITY + 1) * lanes + j]
         w3 = row[(at.PULLEY + 5) * lanes + j] - row[(at.LOAD_VELOCITY + 2) * lanes + j]
         distance = np.sqrt(u1 * u1 + u2 * u2 + u3 * u3 + 1e-18)
-        length = row[at.FREE_LENGTH * lanes + j] + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
-        rate = (u1 * w1 + u2 * w2 + u3 * w3) / distance - row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_SPEED * lanes + j]
+        length = (
+            row[at.FREE_LENGTH * lanes + j] + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
+        )
+        rate = (u1 * w1 + u2 * w2 + u3 * w3) / distance - row[at.DRUM_RADIUS * lanes + j] * row[
+            at.DRUM_SPEED * lanes + j
+        ]
         intact = 1.0 - row[at.PARTED * lanes + j]
         force = intact * tension(
             distance + row[at.DRUM_TO_PULLEY * lanes + j] - length,

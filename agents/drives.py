@@ -1,0 +1,178 @@
+"""Open-loop drives: the drum angle as a function of time, φ_H(t) with φ_H(0) = 0.
+
+The source's eqs. (33)-(36) name a cubic spline and a "pseudo-harmonic" function and their decision variables;
+its exact text is not available to us. Each class below says which form it takes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline
+
+from aframe_env.dynamics.compiling import kernel
+from aframe_env.validation import InvalidValue, require_number
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@runtime_checkable
+class Drive(Protocol):
+    """A prescribed drum angle. Positive angles pay out rope."""
+
+    @property
+    def duration(self) -> float:
+        """t_k: how long the drive was made for, s."""
+        ...
+
+    def angle(self, time: npt.ArrayLike) -> FloatArray:
+        """φ_H, rad, at ``time`` s (any shape, in [0, duration])."""
+        ...
+
+    def speed(self, time: npt.ArrayLike) -> FloatArray:
+        """dφ_H/dt, rad/s."""
+        ...
+
+    @property
+    def variables(self) -> FloatArray:
+        """The vector of decision variables."""
+        ...
+
+
+def _finite(name: str, values: tuple[float, ...]) -> None:
+    for i, value in enumerate(values):
+        require_number(f"{name}[{i}]", value, "")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SplineDrive:
+    """Cubic spline on n equal intervals of [0, t_k], eq. (33); decision variables (35).
+
+    Form taken: twice continuously differentiable through φ_H(0) = 0 and the values at the knots t_1 .. t_n, with
+    natural ends (no second derivative at 0 and t_k): the least curved of all interpolants, and the one whose speed
+    at t = 0 is free to meet that of a deck already under way.
+    """
+
+    duration: float
+    """t_k, s."""
+    values: tuple[float, ...]
+    """φ_H at t_1 .. t_n, rad."""
+
+    def __post_init__(self) -> None:
+        require_number("duration", self.duration, "s", low=0.0, low_open=True)
+        if len(self.values) < 3:
+            raise InvalidValue(f"values: {len(self.values)} knots: a spline drive needs at least 3 intervals")
+        _finite("values", self.values)
+
+    @classmethod
+    def from_variables(cls, variables: npt.ArrayLike, duration: float) -> SplineDrive:
+        """Drive with the decision variables (n,) rad over ``duration`` s."""
+        return cls(duration=duration, values=tuple(np.asarray(variables, dtype=np.float64).tolist()))
+
+    @property
+    def variables(self) -> FloatArray:
+        """Values at the knots t_1 .. t_n, rad: (n,)."""
+        return np.array(self.values)
+
+    @property
+    def intervals(self) -> int:
+        """n."""
+        return len(self.values)
+
+    @cached_property
+    def _spline(self) -> CubicSpline[np.float64]:
+        knots = np.linspace(0.0, self.duration, self.intervals + 1)
+        return CubicSpline(knots, np.concatenate([[0.0], self.values]), bc_type="natural")
+
+    def angle(self, time: npt.ArrayLike) -> FloatArray:
+        """φ_H, rad, at ``time`` s."""
+        return np.asarray(self._spline(np.asarray(time, dtype=np.float64)))
+
+    def speed(self, time: npt.ArrayLike) -> FloatArray:
+        """dφ_H/dt, rad/s."""
+        return np.asarray(self._spline(np.asarray(time, dtype=np.float64), 1))
+
+
+def spline_matrices(duration: float, intervals: int, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Matrices (T, n) that turn the knots' values into angle and speed of a ``SplineDrive`` at ``times``."""
+    knots = np.linspace(0.0, duration, intervals + 1)
+    spline = CubicSpline(knots, np.eye(intervals + 1)[:, 1:], bc_type="natural")
+    return np.ascontiguousarray(spline(times)), np.ascontiguousarray(spline(times, 1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class HarmonicDrive:
+    """Pseudo-harmonic drive, eq. (34); decision variables (36).
+
+    Form taken: φ_H(t) = Σ_i a_i (sin(ω_i t + α_i) - sin α_i), i = 1 .. n: harmonics of free amplitude,
+    frequency and phase, and the constant that makes φ_H(0) = 0.
+    """
+
+    duration: float
+    """t_k, s."""
+    amplitudes: tuple[float, ...]
+    """a_i, rad."""
+    frequencies: tuple[float, ...]
+    """ω_i, rad/s."""
+    phases: tuple[float, ...]
+    """α_i, rad."""
+
+    def __post_init__(self) -> None:
+        require_number("duration", self.duration, "s", low=0.0, low_open=True)
+        if not len(self.amplitudes) == len(self.frequencies) == len(self.phases) > 0:
+            raise InvalidValue("amplitudes, frequencies, phases: must be of one length, at least 1")
+        for name in ("amplitudes", "frequencies", "phases"):
+            _finite(name, getattr(self, name))
+
+    @classmethod
+    def from_variables(cls, variables: npt.ArrayLike, duration: float) -> HarmonicDrive:
+        """Drive with the decision variables (a_1, ω_1, α_1, a_2, ...) over ``duration`` s."""
+        v = np.asarray(variables, dtype=np.float64)
+        if v.ndim != 1 or len(v) % 3 or not len(v):
+            raise InvalidValue(f"variables: shape {v.shape}: must be (3 n,)")
+        a, w, p = (tuple(part.tolist()) for part in v.reshape(-1, 3).T)
+        return cls(duration=duration, amplitudes=a, frequencies=w, phases=p)
+
+    @property
+    def variables(self) -> FloatArray:
+        """(a_1, ω_1, α_1, a_2, ω_2, α_2, ...): (3 n,) rad, rad/s, rad."""
+        return np.stack([self.amplitudes, self.frequencies, self.phases], axis=1).ravel()
+
+    def angle(self, time: npt.ArrayLike) -> FloatArray:
+        """φ_H, rad, at ``time`` s."""
+        return harmonic_samples(self.variables, np.asarray(time, dtype=np.float64))[0]
+
+    def speed(self, time: npt.ArrayLike) -> FloatArray:
+        """dφ_H/dt, rad/s."""
+        return harmonic_samples(self.variables, np.asarray(time, dtype=np.float64))[1]
+
+
+def harmonic_samples(variables: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Angle and speed at ``times`` of the ``HarmonicDrive`` with these variables."""
+    angle, speed = np.zeros(times.shape), np.zeros(times.shape)
+    for a, w, p in variables.reshape(-1, 3).tolist():
+        argument = w * times + p
+        angle += a * (np.sin(argument) - math.sin(p))
+        speed += a * w * np.cos(argument)
+    return angle, speed
+
+
+@kernel
+def uniform_harmonic_samples(variables: FloatArray, step: float, count: int) -> tuple[FloatArray, FloatArray]:
+    """``harmonic_samples`` at 0, step, 2 step, ...: each harmonic a turning complex number, no sine in the loop."""
+    angle, speed = np.zeros(count), np.zeros(count)
+    for i in range(variables.shape[0] // 3):
+        a, w, p = variables[3 * i], variables[3 * i + 1], variables[3 * i + 2]
+        s, c = math.sin(p), math.cos(p)
+        turn_s, turn_c = math.sin(w * step), math.cos(w * step)
+        offset = s
+        for k in range(count):
+            angle[k] += a * (s - offset)
+            speed[k] += a * w * c
+            s, c = s * turn_c + c * turn_s, c * turn_c - s * turn_s
+    return angle, speed

@@ -1,0 +1,254 @@
+"""Optimised drives: Nelder-Mead on the decision variables (35), (36), from a starting guess that needs no luck.
+
+The guess is the inverse of the model's vertical motion: the rope that a load held at h would need while the pulley
+moves. Restarts around the best vertex, with a fresh simplex, take Nelder-Mead out of the stalls it is known for.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import least_squares, minimize
+
+from aframe_env.scenario import Scenario
+from aframe_env.validation import require_choice, require_integer, require_number
+from agents.drives import (
+    Drive,
+    HarmonicDrive,
+    SplineDrive,
+    harmonic_samples,
+    spline_matrices,
+    uniform_harmonic_samples,
+)
+from agents.objectives import FINE_STEP, Objective, Outcome, coarse_step
+
+FloatArray = npt.NDArray[np.float64]
+Family = Literal["spline", "harmonic"]
+ObjectiveName = Literal["omega1", "omega2"]
+FAMILIES: Final = ("spline", "harmonic")
+OBJECTIVES: Final = ("omega1", "omega2")
+Progress = Callable[[int, float], object]
+"""Called with the number of evaluations so far and the best value of the objective."""
+
+_IMPROVEMENT = 2e-3  # a round of Nelder-Mead that gains less than this share ends the search
+_LEAST_SCALE = 0.02  # m of rope: a harmonic smaller than this is scaled as if it were this large
+
+
+@dataclass(frozen=True, kw_only=True)
+class OptimisedDrive:
+    """A drive, what it was optimised for, and what it does on its scenario (without the winch's limits)."""
+
+    drive: Drive
+    family: str
+    """"spline" or "harmonic"."""
+    objective: str
+    """"omega1" or "omega2"."""
+    omega1: float
+    """Ω1, m² s."""
+    omega2: float
+    """Ω2, m."""
+    rms: float
+    """m."""
+    amplitude: float
+    """Greatest distance of the load from its required level, m (equal to Ω2 by its definition)."""
+    evaluations: int
+    """Times that an objective was evaluated while searching, a start from the Ω1 optimum included."""
+    seconds: float
+    """Wall-clock time of the search."""
+
+
+def required_angle(objective: Objective) -> FloatArray:
+    """Drum angle [rad] at the objective's times that would hold the load at h right below where the ship rests.
+
+    The rope's law solved for the unstretched length at a tension equal to the weight: what remains to be found by
+    optimisation is the pendulum's share, the start's transient, and what the family of drives can not follow.
+    """
+    scenario = objective.scenario
+    crane = scenario.crane
+    load = np.array([*crane.pulley_position[:2], scenario.target_level])
+    distance = np.linalg.norm(objective.path[:, :3] - load, axis=1)
+    length = (distance + crane.drum_to_pulley) / (1.0 + scenario.weight / crane.rope.axial_stiffness)
+    return np.asarray((length - length[0]) / crane.winch.drum_radius)
+
+
+def optimise(
+    family: Family,
+    scenario: Scenario,
+    objective: ObjectiveName = "omega1",
+    duration: float = 60.0,
+    intervals: int = 48,
+    harmonics: int = 8,
+    seed: int = 0,
+    max_evaluations: int = 6_000,
+    progress: Progress | None = None,
+) -> OptimisedDrive:
+    """Find the drive of a family that makes an objective least on a scenario whose future is known.
+
+    ``duration`` is t_k [s]; ``intervals`` (of a spline) is in [3, 500], ``harmonics`` in [1, 64]. The same
+    arguments give the same drive; ``seed`` turns the simplexes of the restarts. Raises InvalidValue for arguments
+    out of range.
+    """
+    require_choice("family", family, FAMILIES)
+    require_choice("objective", objective, OBJECTIVES)
+    require_number("duration", duration, "s", low=0.1, high=3600.0)
+    require_integer("intervals", intervals, low=3, high=500)
+    require_integer("harmonics", harmonics, low=1, high=64)
+    require_integer("seed", seed, low=0, high=2**32 - 1)
+    require_integer("max_evaluations", max_evaluations, low=1, high=10**9)
+    begin = time.perf_counter()
+    coarse = Objective(scenario, duration, coarse_step(scenario))
+    search = _Search(coarse, max_evaluations, np.random.default_rng(seed), progress)
+    needed = required_angle(coarse)
+    if family == "spline":
+        x, scale, sample = _spline_start(coarse, needed, intervals)
+    else:
+        x, scale, sample = _harmonic_start(coarse, needed, harmonics)
+    share = 0.5 if objective == "omega2" else 1.0
+    x = search.run(x, scale, sample, "omega1", int(share * max_evaluations))
+    if objective == "omega2":
+        x = search.run(x, scale, sample, "omega2", max_evaluations)
+    drive: Drive = (SplineDrive if family == "spline" else HarmonicDrive).from_variables(x, float(duration))
+    seconds = time.perf_counter() - begin
+    outcome = Objective(scenario, duration, min(FINE_STEP, coarse.step)).drive(drive)
+    return OptimisedDrive(
+        drive=drive,
+        family=family,
+        objective=objective,
+        omega1=outcome.omega1,
+        omega2=outcome.omega2,
+        rms=outcome.rms,
+        amplitude=outcome.amplitude,
+        evaluations=search.evaluations,
+        seconds=seconds,
+    )
+
+
+Sample = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+
+
+def _spline_start(
+    objective: Objective, needed: FloatArray, intervals: int
+) -> tuple[FloatArray, FloatArray, Sample]:
+    angle, speed = spline_matrices(objective.duration, intervals, objective.times)
+    # Least squares, not mere interpolation: with few intervals the knots share the error.
+    x = np.linalg.lstsq(angle, needed, rcond=None)[0]
+    scale = np.full(intervals, 1.0 / objective.scenario.crane.winch.drum_radius)
+    return x, scale, lambda v: (angle @ v, speed @ v)
+
+
+def _harmonic_start(
+    objective: Objective, needed: FloatArray, harmonics: int
+) -> tuple[FloatArray, FloatArray, Sample]:
+    """Harmonics taken one by one from the residual's spectrum, all fitted anew after each."""
+    times = objective.times
+    taken = slice(None, None, max(1, len(times) // 600))  # enough for waves; the fit stays quick
+    t, y = times[taken], needed[taken]
+    x = np.empty(0)
+    for _ in range(harmonics):
+        residual = y - harmonic_samples(x, t)[0]
+        guess = _strongest(t, residual)
+        x = least_squares(
+            lambda v: harmonic_samples(v, t)[0] - y,
+            np.concatenate([x, guess]),
+            jac=lambda v: _jacobian(v, t),
+            x_scale=np.tile([1.0, 0.1, 1.0], len(x) // 3 + 1),
+            max_nfev=60,
+        ).x
+    radius = objective.scenario.crane.winch.drum_radius
+    size = np.maximum(np.abs(x[0::3]), _LEAST_SCALE / radius)
+    # A change of one unit of each scaled variable moves about one metre of rope.
+    scale = np.empty_like(x)
+    scale[0::3] = 1.0 / radius
+    scale[1::3] = 2.0 / (size * radius * objective.duration)
+    scale[2::3] = 1.0 / (size * radius)
+    step, count = float(times[1]), len(times)
+    return x, scale, lambda v: uniform_harmonic_samples(v, step, count)
+
+
+def _strongest(t: FloatArray, signal: FloatArray) -> FloatArray:
+    """Amplitude, frequency and phase of the strongest harmonic in a signal, from its zero-padded spectrum."""
+    centred = (signal - signal.mean()) * np.hanning(len(t))
+    size = 8 * len(t)
+    spectrum = np.abs(np.fft.rfft(centred, size))
+    frequencies = 2.0 * np.pi * np.fft.rfftfreq(size, t[1] - t[0])
+    frequency = float(frequencies[1 + int(np.argmax(spectrum[1:]))])
+    basis = np.stack([np.sin(frequency * t), np.cos(frequency * t), np.ones(len(t))], axis=1)
+    s, c, _ = np.linalg.lstsq(basis, signal, rcond=None)[0].tolist()
+    return np.array([np.hypot(s, c), frequency, np.arctan2(c, s)])
+
+
+def _jacobian(variables: FloatArray, t: FloatArray) -> FloatArray:
+    """Derivatives of the harmonic drive's angle by its variables: (T, 3 n)."""
+    a, w, p = variables.reshape(-1, 3).T
+    argument = np.outer(t, w) + p
+    cosine = a * np.cos(argument)
+    parts = (np.sin(argument) - np.sin(p), cosine * t[:, None], cosine - a * np.cos(p))
+    return np.stack(parts, axis=2).reshape(len(t), -1)
+
+
+class _Search:
+    """Nelder-Mead with restarts, counting its evaluations."""
+
+    def __init__(
+        self, objective: Objective, budget: int, rng: np.random.Generator, progress: Progress | None
+    ) -> None:
+        self.objective = objective
+        self.evaluations = 0
+        self._budget = budget
+        self._rng = rng
+        self._progress = progress
+
+    def run(
+        self, x: FloatArray, scale: FloatArray, sample: Sample, name: ObjectiveName, until: int
+    ) -> FloatArray:
+        """Best variables found from ``x`` before ``until`` evaluations; one unit of scale is a metre of rope."""
+        centre = x
+        size = len(x)
+        best_y = np.zeros(size)
+        best = np.inf
+        last: Outcome | None = None
+
+        def value(y: FloatArray) -> float:
+            nonlocal best, best_y, last
+            if self.evaluations >= until:
+                return np.inf
+            self.evaluations += 1
+            outcome = self.objective.evaluate(*sample(centre + scale * y))
+            result = outcome.omega1 if name == "omega1" else outcome.omega2
+            if result < best:
+                best, best_y, last = result, y.copy(), outcome
+            if self._progress is not None and self.evaluations % 100 == 0:
+                self._progress(self.evaluations, best)
+            return result if np.isfinite(result) else np.inf
+
+        value(best_y)
+        turn = np.eye(size)
+        while self.evaluations < until and last is not None:
+            before = best
+            # A simplex of the size of what is still wrong: larger only throws the load about.
+            edge = 0.5 * last.rms
+            simplex = np.concatenate([best_y[None], best_y + edge * turn])
+            minimize(
+                value,
+                best_y,
+                method="Nelder-Mead",
+                options={
+                    "initial_simplex": simplex,
+                    "adaptive": True,
+                    "maxfev": until - self.evaluations,
+                    "maxiter": 10**9,
+                    "xatol": 1e-3 * edge,
+                    "fatol": 1e-4 * best,
+                },
+            )
+            if best > (1.0 - _IMPROVEMENT) * before:
+                break
+            turn = np.linalg.qr(self._rng.standard_normal((size, size)))[0]
+        if self._progress is not None:
+            self._progress(self.evaluations, best)
+        return np.asarray(centre + scale * best_y)

@@ -1,0 +1,70 @@
+import json
+
+import pytest
+
+from aframe_env.dynamics.rfem.reference import static_cases, time_series
+from aframe_env.validation import InvalidValue
+from train.verification.cases import dynamic_case, release_case, static_case
+from train.verify import main
+
+
+def test_load_case_from_file(tmp_path):
+    case, out = tmp_path / "case.toml", tmp_path / "out.json"
+    case.write_text("own_weight = false\n[forces]\nS = [0, 0, -981e3]\n")
+    assert main(["--load-case", str(case), "--out", str(out)]) == 0
+    found, reference = json.loads(out.read_text()), static_cases()["V"]
+    assert set(reference) <= set(found)
+    assert found["u_S_D"] == pytest.approx(reference["u_S_D"], rel=1e-4, abs=1e-12)
+    assert found["S_R_tension"] == pytest.approx(reference["S_R_tension"], rel=1e-6)
+    assert len(found["along"]) > 70
+    assert list(tmp_path.iterdir()).__len__() == 2
+
+
+def test_release_has_the_reference_columns():
+    columns = release_case({"rfes": [5, 2], "rope_tension": 1e5, "ramp": 0.1, "duration": 0.02, "step": 1e-3})
+    assert list(columns) == list(time_series("release_ramp"))
+    assert len(columns["t_s"]) == 5
+
+
+def test_dynamic_case_has_the_reference_columns():
+    harmonic = {"direction": "heave", "amplitude": 1.0, "period": 9.0}
+    columns = dynamic_case(
+        {"rfes": [5, 2], "deck": [harmonic], "duration": 0.2, "initial": "rest", "rope_damping": 1e4}
+    )
+    assert set(columns) == set(time_series("paper_flexible"))
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        ({"own_wieght": True}, "own_wieght: unknown key; must be one of"),
+        ({"own_weight": 1}, "own_weight.*true or false"),
+        ({"rfes": [5]}, "rfes"),
+        ({"rfes": [5, 3]}, "even"),
+        ({"forces": {"Q": [0, 0, 1]}}, "forces.Q"),
+        ({"forces": {"S": "down"}}, "forces.S"),
+        ({"rope_tension": -5}, r"rope_tension = -5 N: must be in \[0, inf\) N"),
+        ({"servomotors": "soft"}, "servomotors.*'rigid', 'elastic'"),
+        ({"servomotors": "elastic"}, "servomotor_stiffness.*N/m"),
+        ({"servomotor_stiffness": 1e8}, "elastic"),
+        ({"frame": {"luffing_angle": 9.0}}, "luffing_angle.*rad"),
+        ({"layout": "two"}, "layout"),
+    ],
+)
+def test_bad_keys_are_named(data, words):
+    with pytest.raises(InvalidValue, match=words):
+        static_case(data)
+
+
+def test_errors_reach_the_user_without_a_traceback(tmp_path, capsys):
+    case = tmp_path / "case.toml"
+    case.write_text("own_weight = maybe\n")
+    assert main(["--load-case", str(case), "--out", str(tmp_path / "out.json")]) == 2
+    assert "is not TOML" in capsys.readouterr().err
+    assert main(["--release", str(tmp_path / "none.toml"), "--out", str(tmp_path / "out.json")]) == 2
+    assert "cannot be read" in capsys.readouterr().err
+
+
+def test_bad_deck_is_named():
+    with pytest.raises(InvalidValue, match=r"deck\.period: missing"):
+        dynamic_case({"deck": [{"direction": "heave", "amplitude": 1.0}]})

@@ -1,0 +1,1 @@
+"""Checks of the full model against closed forms and independent programs."""

@@ -1,0 +1,279 @@
+"""Load cases, releases and dynamic runs from TOML files, and their results as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tempfile
+import tomllib
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from aframe_env.crane import Crane, Frame
+from aframe_env.dynamics.rfem.chain import Division
+from aframe_env.dynamics.rfem.deck import DeckHarmonic, HarmonicDeck, paper_motion
+from aframe_env.dynamics.rfem.dynamics import DynamicCase, DynamicResult, simulate
+from aframe_env.dynamics.rfem.history import FrameHistory
+from aframe_env.dynamics.rfem.model import FrameModel, frame_model
+from aframe_env.dynamics.rfem.release import release
+from aframe_env.dynamics.rfem.statics import LOADED_POINTS, LoadCase, static
+from aframe_env.section import Servomotor
+from aframe_env.validation import InvalidValue, require_choice, require_number
+
+FORMAT = """\
+Files are TOML, SI units. Keys of every kind of file (all optional):
+
+  rfes = [120, 100]            primary elements of a leg and of the top beam (the beam's even);
+                               for a dynamic run the default is [20, 16]
+  layout = "one_chain"         or "three_beams", the paper's previous model
+  corrected_shear = false      true: static deflections exact at any number of elements
+  servomotors = "rigid"        or "elastic", then also
+  servomotor_stiffness = 3e8   N/m, each
+  servomotor_damping = 0.0     N s/m, each, elastic only
+  [frame]                      half_width, height, servomotor_height, servomotor_deck_x (m),
+                               luffing_angle (rad)
+
+--load-case, static:
+  own_weight = true            own weight of legs and beam
+  rope_tension = 0.0           N, at S along both rope legs: down to the load, and to the drum
+  [forces]                     N, in {D}: x outboard, z up
+  S = [0.0, 0.0, -981000.0]    and N_R, N_L, B_R, B_L
+
+--release: the keys of --load-case say what loads the frame before; its forces and rope tension go,
+its own weight stays; undamped:
+  ramp = 0.1                   s, half a cosine; 0 (default) releases at once
+  duration = 2.0               s
+  output_interval = 0.005      s
+  step = 0.0001                s
+
+--dynamic, the load on the rope, the ship moving, the drum still:
+  load_mass = 100000.0         kg
+  required_height = -300.0     m, h: the load's height at rest with the frame rigid
+  initial = "comoving"         or "rest"
+  rope_damping = 0.0           N s/m, d_R
+  duration = 60.0              s
+  output_interval = 0.05       s
+  step = 0.0025                s
+  [[deck]]                     one table a harmonic, amplitude sin(2 pi t/period + phase);
+  direction = "heave"          surge, sway, heave (m), roll, pitch, yaw (rad)
+  amplitude = 2.0              without any: motion (42), surge 1 m/6 s and heave 2 m/12 s
+  period = 12.0                s
+  phase = 0.0                  rad
+"""
+
+_COMMON = {
+    "rfes",
+    "layout",
+    "corrected_shear",
+    "servomotors",
+    "servomotor_stiffness",
+    "servomotor_damping",
+    "frame",
+}
+_STATIC = {"own_weight", "rope_tension", "forces"}
+_RELEASE = {"ramp", "duration", "output_interval", "step"}
+_DYNAMIC = {
+    "load_mass",
+    "required_height",
+    "initial",
+    "rope_damping",
+    "duration",
+    "output_interval",
+    "step",
+    "deck",
+}
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Raises:
+        InvalidValue: No such file, or not TOML.
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InvalidValue(f"{path}: cannot be read: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InvalidValue(f"{path}: is not TOML: {error}") from error
+
+
+def _only(data: Mapping[str, Any], allowed: set[str], where: str = "") -> None:
+    for key in data:
+        if key not in allowed:
+            raise InvalidValue(f"{where}{key}: unknown key; must be one of {', '.join(sorted(allowed))}")
+
+
+def _flag(data: Mapping[str, Any], name: str, default: bool) -> bool:
+    value = data.get(name, default)
+    if not isinstance(value, bool):
+        raise InvalidValue(f"{name} = {value!r}: must be true or false")
+    return value
+
+
+def _number(
+    data: Mapping[str, Any], name: str, default: float, unit: str, low: float, low_open: bool = False
+) -> float:
+    value = data.get(name, default)
+    require_number(name, value, unit, low=low, low_open=low_open)
+    return float(value)
+
+
+def _table(data: Mapping[str, Any], name: str) -> dict[str, Any]:
+    value = data.get(name, {})
+    if not isinstance(value, dict):
+        raise InvalidValue(f"{name} = {value!r}: must be a table, [{name}]")
+    return value
+
+
+def crane_of(data: Mapping[str, Any]) -> Crane:
+    """The reference crane with the file's changes of frame and servomotors."""
+    given = _table(data, "frame")
+    allowed = {item.name for item in fields(Frame)} - {"structure"}
+    _only(given, allowed, "frame.")
+    frame = Frame(**given)
+    kind = data.get("servomotors", "rigid")
+    require_choice("servomotors", kind, ("rigid", "elastic"))
+    if kind == "elastic" and "servomotor_stiffness" not in data:
+        raise InvalidValue('servomotor_stiffness: needed with servomotors = "elastic", in (0, inf) N/m')
+    if kind == "rigid" and ("servomotor_stiffness" in data or "servomotor_damping" in data):
+        raise InvalidValue('servomotor_stiffness, servomotor_damping: only with servomotors = "elastic"')
+    if kind == "elastic":
+        require_number("servomotor_stiffness", data["servomotor_stiffness"], "N/m", low=0.0, low_open=True)
+        servomotor = Servomotor(
+            stiffness=float(data["servomotor_stiffness"]),
+            damping=_number(data, "servomotor_damping", 0.0, "N s/m", low=0.0),
+        )
+        frame = replace(frame, structure=replace(frame.structure, servomotor=servomotor))
+    return Crane(frame=frame)
+
+
+def model_of(data: Mapping[str, Any], crane: Crane, default: tuple[int, int]) -> FrameModel:
+    """The frame's model as finely divided as the file says."""
+    rfes = data.get("rfes", list(default))
+    if not isinstance(rfes, list) or len(rfes) != 2:
+        raise InvalidValue(
+            f"rfes = {rfes!r}: must be two integers, [elements of a leg, elements of the beam]"
+        )
+    layout = data.get("layout", "one_chain")
+    return frame_model(
+        crane.frame,
+        Division(leg=rfes[0], beam=rfes[1]),
+        layout=layout,
+        corrected_shear=_flag(data, "corrected_shear", False),
+    )
+
+
+def _load_case(data: Mapping[str, Any]) -> LoadCase:
+    forces = _table(data, "forces")
+    _only(forces, set(LOADED_POINTS), "forces.")
+    return LoadCase(
+        own_weight=_flag(data, "own_weight", True),
+        forces={name: tuple(value) if isinstance(value, list) else value for name, value in forces.items()},
+        rope_tension=_number(data, "rope_tension", 0.0, "N", low=0.0),
+    )
+
+
+def static_case(data: Mapping[str, Any]) -> dict[str, object]:
+    """Solve a static case: the keys of the reference data's cases, and the section forces along the frame."""
+    _only(data, _COMMON | _STATIC)
+    crane = crane_of(data)
+    result = static(crane, _load_case(data), model=model_of(data, crane, (120, 100)))
+    report = result.reference_case()
+    report["units"] = "N, m, rad, N m, Pa; deck frame D"
+    report["along"] = [
+        {
+            "member": station.member,
+            "s_m": station.along,
+            **dict(zip(("N", "Vy", "Vz", "T", "My", "Mz"), map(float, station.forces), strict=True)),
+            "von_mises_Pa": station.von_mises,
+        }
+        for station in result.along(per_member=25)
+    ]
+    return report
+
+
+def columns_of(history: FrameHistory) -> dict[str, npt.NDArray[np.float64]]:
+    """Deflection of S, servomotor tensions and reactions with the column names of the reference data."""
+    deflection, servomotors, feet = history.displacement("S"), history.servomotors(), history.feet()
+    columns = {"t_s": history.time}
+    columns |= {f"uS{axis + 1}_m": deflection[:, axis] for axis in range(3)}
+    columns |= {f"S_{side}_N": servomotors[:, index] for index, side in enumerate("RL")}
+    for index, side in enumerate("RL"):
+        columns |= {f"RA{side}{axis + 1}_N": feet[:, index, axis] for axis in range(3)}
+    return columns
+
+
+def dynamic_columns(result: DynamicResult) -> dict[str, npt.NDArray[np.float64]]:
+    """Load, rope and :func:`columns_of` the frame."""
+    columns = {f"xL{axis + 1}_m": result.load[:, axis] for axis in range(3)}
+    columns |= {f"vL{axis + 1}": result.load_velocity[:, axis] for axis in range(3)}
+    return columns | {"T_rope_N": result.tension} | columns_of(result.frame)
+
+
+def release_case(data: Mapping[str, Any]) -> dict[str, object]:
+    """Run a release; time series with the column names of the reference data."""
+    _only(data, _COMMON | _STATIC | _RELEASE)
+    crane = crane_of(data)
+    history = release(
+        crane,
+        _load_case(data),
+        ramp=_number(data, "ramp", 0.0, "s", low=0.0),
+        duration=_number(data, "duration", 2.0, "s", low=0.0, low_open=True),
+        step=_number(data, "step", 1e-4, "s", low=0.0, low_open=True),
+        output_interval=_number(data, "output_interval", 5e-3, "s", low=0.0, low_open=True),
+        model=model_of(data, crane, (120, 100)),
+    )
+    return {name: column.tolist() for name, column in columns_of(history).items()}
+
+
+def dynamic_case(data: Mapping[str, Any]) -> dict[str, object]:
+    """Run a dynamic case; time series with the column names of the reference data."""
+    _only(data, _COMMON | _DYNAMIC)
+    crane = crane_of(data)
+    harmonics = data.get("deck", [])
+    if not isinstance(harmonics, list):
+        raise InvalidValue(f"deck = {harmonics!r}: must be tables, [[deck]]")
+    names = {item.name for item in fields(DeckHarmonic)}
+    for harmonic in harmonics:
+        _only(harmonic, names, "deck.")
+        for name in ("direction", "amplitude", "period"):
+            if name not in harmonic:
+                raise InvalidValue(f"deck.{name}: missing; needed in every [[deck]]")
+    motion = HarmonicDeck(tuple(DeckHarmonic(**item) for item in harmonics)) if harmonics else paper_motion()
+    plain = {name: data[name] for name in _DYNAMIC - {"deck"} if name in data}
+    result = simulate(crane, DynamicCase(deck=motion, **plain), model=model_of(data, crane, (20, 16)))
+    return {name: column.tolist() for name, column in dynamic_columns(result).items()}
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file under a temporary name, then rename it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name, suffix=".part")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        os.chmod(name, 0o644)
+        os.replace(name, path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def write_json(path: Path, data: object) -> None:
+    """Write JSON; NaN becomes null."""
+
+    def clean(value: object) -> object:
+        if isinstance(value, float) and not math.isfinite(value):
+            return None
+        if isinstance(value, dict):
+            return {key: clean(item) for key, item in value.items()}
+        return [clean(item) for item in value] if isinstance(value, list) else value
+
+    write_text(path, json.dumps(clean(data), indent=1, allow_nan=False) + "\n")

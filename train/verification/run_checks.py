@@ -1,0 +1,235 @@
+"""Checks of releases and of runs with rope, load and ship motion."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from aframe_env.crane import Crane
+from aframe_env.dynamics.rfem.beam import Array
+from aframe_env.dynamics.rfem.deck import DeckHarmonic, HarmonicDeck
+from aframe_env.dynamics.rfem.dynamics import DynamicCase, DynamicResult, simulate
+from aframe_env.dynamics.rfem.energy import energy_balance
+from aframe_env.dynamics.rfem.model import frame_model
+from aframe_env.dynamics.rfem.reference import time_series
+from aframe_env.dynamics.rfem.release import release
+from train.verification.cases import columns_of, dynamic_columns
+from train.verification.frame_checks import CASES, model, order
+from train.verification.report import Check, Row
+
+REACTIONS = ("S_R_N", "S_L_N", "RAR1_N", "RAR2_N", "RAR3_N", "RAL1_N", "RAL2_N", "RAL3_N")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """Columns of a run beside those of its reference."""
+
+    here: dict[str, Array]
+    there: dict[str, Array]
+
+    def error(self, column: str) -> float:
+        """Largest difference over the reference's peak-to-peak."""
+        gap = np.max(np.abs(self.here[column] - self.there[column]))
+        return float(gap / np.ptp(self.there[column]))
+
+    def rows(self, columns: tuple[str, ...]) -> list[Row]:
+        """Peak-to-peak of both and the error."""
+        return [
+            Row(
+                quantity=f"{column}, peak-to-peak",
+                measured=f"{np.ptp(self.here[column]):.6g}",
+                reference=f"{np.ptp(self.there[column]):.6g}",
+                error=f"{self.error(column):.3%}",
+            )
+            for column in columns
+        ]
+
+
+@cache
+def ramp_release(leg: int = 120, beam: int = 100) -> Comparison:
+    """Release of 100 t over 0.1 s, 2 s, undamped."""
+    history = release(Crane(), CASES["V"], ramp=0.1, step=1e-4, model=model(leg, beam))
+    return Comparison(here=columns_of(history), there=time_series("release_ramp"))
+
+
+@cache
+def paper_run(step: float = 2.5e-3) -> DynamicResult:
+    """The paper's motion (42), drum still, at 20/16."""
+    return simulate(Crane(), DynamicCase(step=step), model=model(20, 16))
+
+
+def releases() -> Check:
+    """The ramped release at the reference's own mesh, and coarser for comparison."""
+    columns = ("uS1_m", "uS3_m", *REACTIONS)
+    fine = ramp_release()
+    worst = max(fine.error(column) for column in columns)
+    rows = fine.rows(columns)
+    for division in ((20, 16), (40, 32), (60, 50)):
+        errors = [ramp_release(*division).error(column) for column in columns]
+        rows.append(
+            Row(
+                quantity=f"worst of these at {division[0]}/{division[1]}",
+                measured="",
+                reference="",
+                error=f"{max(errors):.3%}",
+            )
+        )
+    return Check(
+        name="release of 100 t over 0.1 s, 2 s, undamped, at 120/100 rfes (the reference's 0.1 m)",
+        bar="deflection of S and reactions ≤ 1 % of peak-to-peak",
+        measured=f"{worst:.3%} at worst",
+        passed=worst <= 0.01,
+        rows=rows,
+    )
+
+
+def paper_case() -> list[Check]:
+    """Full against simplified model, and forces, as the independent program has them."""
+    there, rigid = time_series("paper_flexible"), time_series("paper_rigid")
+    both = Comparison(here=dynamic_columns(paper_run()), there=there)
+    here_gap = both.here["xL3_m"] - rigid["xL3_m"]
+    there_gap = there["xL3_m"] - rigid["xL3_m"]
+    largest, target = float(np.max(np.abs(here_gap))), float(np.max(np.abs(there_gap)))
+    apart = float(np.max(np.abs(here_gap - there_gap))) / target
+    forces = max(both.error(column) for column in REACTIONS)
+    return [
+        Check(
+            name="paper's case, 60 s: x_L3 full − simplified (fig. 14), 20/16 rfes",
+            bar="the independent program's difference within 1 % of it",
+            measured=f"{largest * 1e3:.2f} mm; the histories of it within {apart:.2%}",
+            passed=abs(largest / target - 1.0) <= 0.01 and apart <= 0.01,
+            rows=[
+                Row(
+                    quantity="largest difference, mm",
+                    measured=f"{largest * 1e3:.3f}",
+                    reference=f"{target * 1e3:.3f}",
+                    error=f"{largest / target - 1.0:.3%}",
+                ),
+                *both.rows(("xL1_m", "xL3_m", "uS1_m", "uS3_m")),
+            ],
+        ),
+        Check(
+            name="paper's case: servomotor force and leg reactions (fig. 12), 20/16 rfes",
+            bar="≤ 1 % of peak-to-peak",
+            measured=f"{forces:.3%} at worst",
+            passed=forces <= 0.01,
+            rows=both.rows(REACTIONS),
+        ),
+    ]
+
+
+def stiff_frame() -> Check:
+    """A frame 1000 × stiffer moves the load as a rigid one does."""
+    frame = Crane().frame
+    material = replace(
+        frame.structure.material,
+        young_modulus=1e3 * frame.structure.material.young_modulus,
+        shear_modulus=1e3 * frame.structure.material.shear_modulus,
+    )
+    stiff = replace(frame, structure=replace(frame.structure, material=material))
+    result = simulate(Crane(frame=stiff), DynamicCase(step=1e-3), model=frame_model(stiff))
+    gap = float(np.max(np.abs(result.load[:, 2] - time_series("paper_rigid")["xL3_m"])))
+    return Check(
+        name="frame 1000 × stiffer, 60 s, step 1 ms",
+        bar="the simplified model's x_L3 within 1e-4 m",
+        measured=f"{gap:.1e} m",
+        passed=gap <= 1e-4,
+    )
+
+
+def energy() -> Check:
+    """Work of the deck against what is stored and lost."""
+    case = DynamicCase(step=2.5e-3, output_interval=2.5e-3)
+    still = energy_balance(simulate(Crane(), case)).error
+    frame = Crane().frame
+    lossy = replace(frame.structure.material, normal_damping=2.1e8, tangential_damping=5e7)
+    damped = replace(frame, structure=replace(frame.structure, material=lossy))
+    damped_case = replace(case, rope_damping=5e4, initial="rest")
+    lost = energy_balance(simulate(Crane(frame=damped), damped_case, model=frame_model(damped)))
+    worst = max(still, lost.error)
+    return Check(
+        name="energy balance over 60 s, step 2.5 ms",
+        bar="1e-5 relative",
+        measured=f"undamped {still:.1e}; frame and rope damped {lost.error:.1e} "
+        f"({lost.dissipated[-1] / 1e3:.0f} kJ lost)",
+        passed=worst <= 1e-5,
+    )
+
+
+def steps() -> Check:
+    """Halving the step."""
+    runs = {h: simulate(Crane(), DynamicCase(step=h)).load[:, 2] for h in (0.01, 0.005, 0.0025, 0.00125)}
+    finest = runs[0.00125] + (runs[0.00125] - runs[0.0025]) / 3.0
+    errors = {h: float(np.max(np.abs(run - finest))) for h, run in runs.items()}
+    orders = [order(errors[a], errors[b]) for a, b in ((0.01, 0.005), (0.005, 0.0025))]
+    return Check(
+        name="halving the step, 10/8 rfes, x_L3 over 60 s",
+        bar="second order or better",
+        measured=f"order {min(orders):.2f} … {max(orders):.2f}",
+        passed=min(orders) > 1.9,
+        rows=[
+            Row(
+                quantity=f"step {h * 1e3:g} ms: error of x_L3",
+                measured=f"{error * 1e3:.4f} mm",
+                reference="extrapolated",
+                error="",
+            )
+            for h, error in errors.items()
+        ],
+    )
+
+
+def rough_sea(seed: int = 20090601) -> HarmonicDeck:
+    """A rough irregular motion in all six directions: 12 harmonics each, periods of 5 to 20 s."""
+    random = np.random.default_rng(seed)
+    amplitudes = {"surge": 0.5, "sway": 0.5, "heave": 0.9, "roll": 0.03, "pitch": 0.02, "yaw": 0.01}
+    return HarmonicDeck(
+        tuple(
+            DeckHarmonic(
+                direction=direction,
+                amplitude=float(scale / np.sqrt(6.0) * random.uniform(0.5, 1.5)),
+                period=float(random.uniform(5.0, 20.0)),
+                phase=float(random.uniform(0.0, 2.0 * np.pi)),
+            )
+            for direction, scale in amplitudes.items()
+            for _ in range(12)
+        )
+    )
+
+
+def drift() -> Check:
+    """Feet and cylinders after ten minutes."""
+    begin = time.perf_counter()
+    case = DynamicCase(deck=rough_sea(), duration=600.0, step=0.02, output_interval=0.2, rope_damping=2e4)
+    result = simulate(Crane(), case, model=model(5, 2))
+    moved = result.frame.constraint_violation()
+    heave = float(np.ptp(result.deck.position[:, 2]))
+    return Check(
+        name="600 s in a rough sea, all six directions, step 20 ms",
+        bar="feet and (linear) servomotor lengths within 1 µm",
+        measured=f"{moved:.1e} m, by elimination of the constrained coordinates "
+        f"(heave {heave:.1f} m peak-to-peak; {time.perf_counter() - begin:.0f} s)",
+        passed=moved < 1e-6,
+        rows=[
+            Row(
+                quantity="change of the distance N–C of the displaced points, at most",
+                measured=f"{_length_error(result):.1e} m",
+                reference="second order in the displacements, which the linear frame leaves out",
+                error="",
+            )
+        ],
+    )
+
+
+def _length_error(result: DynamicResult) -> float:
+    frame, to_deck = result.frame.model.frame, result.frame.model.to_deck
+    gaps = []
+    for side, y in (("R", -frame.half_width), ("L", frame.half_width)):
+        link = to_deck @ np.array([0.0, y, frame.servomotor_height])
+        link -= np.array([frame.servomotor_deck_x, y, 0.0])
+        lengths = np.linalg.norm(link + result.frame.displacement(f"N_{side}"), axis=1)
+        gaps.append(float(np.max(np.abs(lengths - np.linalg.norm(link)))))
+    return max(gaps)
