@@ -46,9 +46,7 @@ class Frame:
         require_number("half_width", self.half_width, "m", low=0.0, low_open=True)
         require_number("height", self.height, "m", low=0.0, low_open=True)
         require_number("luffing_angle", self.luffing_angle, "rad", low=-1.4, high=1.4)
-        require_number(
-            "servomotor_height", self.servomotor_height, "m", low=0.0, high=self.height, low_open=True
-        )
+        require_number("servomotor_height", self.servomotor_height, "m", low=0.0, high=self.height, low_open=True)
         require_number("servomotor_deck_x", self.servomotor_deck_x, "m")
 
 

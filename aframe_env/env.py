@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -12,7 +13,7 @@ import numpy.typing as npt
 from aframe_env import task
 from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.simulation import RowState, Simulation
-from aframe_env.validation import InvalidValue, require_choice
+from aframe_env.validation import InvalidValue
 
 _ROW = np.zeros(1, dtype=np.int64)
 
@@ -22,7 +23,7 @@ class EnvState:
     """Everything that the rest of an environment's life depends on: the row and the generator."""
 
     row: RowState
-    generator: dict[str, Any]
+    generator: Mapping[str, Any]
 
 
 class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
@@ -102,12 +103,12 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     - `episode_duration`: s (default 60).
     - `observation`: "state", "sensors", or a `Sensors`.
     - `max_inner_step`: s; overrides the choice of the integrator's step.
-    - `render_mode`: None, "human" or "rgb_array".
+    - `render_mode`: None; there is no picture yet.
 
     `reset(options={"scenario": ...})` takes a `Scenario` for the one episode.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 10}  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "render_fps": 10}  # type: ignore[misc]
 
     def __init__(
         self,
@@ -121,7 +122,7 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
         render_mode: str | None = None,
     ) -> None:
         if render_mode is not None:
-            require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
+            raise InvalidValue(f"render_mode = {render_mode!r}: must be None")
         self._simulation = Simulation(
             1,
             model=model,
@@ -131,11 +132,9 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
             observation=observation,
             max_inner_step=max_inner_step,
         )
-        self.observation_space = self._simulation.observation_space
+        self.observation_space = self._simulation.observation_space  # type: ignore[assignment]
         self.action_space = self._simulation.action_space
-        self.metadata = {**self.metadata, "render_fps": max(1, round(1.0 / control_period))}
         self.render_mode = render_mode
-        self._renderer: Any = None
 
     @property
     def simulation(self) -> Simulation:
@@ -162,10 +161,6 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
         super().reset(seed=seed)
         drawn = self._simulation.draw(self.np_random, _scenario_option(options))
         self._simulation.reset_rows(_ROW, [drawn])
-        if self._renderer is not None:
-            self._renderer.reset()
-        if self.render_mode == "human":
-            self.render()
         return self._simulation.observe()[0], self._info(self._simulation.results[0].tolist())
 
     def step(
@@ -184,8 +179,6 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
         simulation.advance(command)
         results = simulation.results[0].tolist()
         truncated = bool(simulation.steps[0] >= simulation.episode_steps)
-        if self.render_mode == "human":
-            self.render()
         return (
             simulation.observe()[0],
             -results[task.COST],
@@ -202,27 +195,6 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
         """Go back to a state that ``get_state`` returned, in this environment or one of the same arguments."""
         self._simulation.write_row(0, state.row)
         self.np_random.bit_generator.state = state.generator
-
-    def render(self) -> npt.NDArray[np.uint8] | None:  # type: ignore[override]
-        """Draw ship, frame, rope, load and error (``render_mode`` "rgb_array" returns the picture)."""
-        if self.render_mode is None:
-            gymnasium.logger.warn("render() without a render_mode: pass render_mode='rgb_array' to make()")
-            return None
-        from aframe_env.rendering.renderer import Renderer
-        from aframe_env.rendering.view import scene_of
-
-        if self._renderer is None:
-            self._renderer = Renderer(self.render_mode, self.metadata["render_fps"])  # type: ignore[arg-type]
-        return self._renderer.draw(scene_of(self._simulation, 0))  # type: ignore[no-any-return]
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_renderer": None}
 
     @staticmethod
     def _info(results: list[float]) -> dict[str, Any]:

@@ -46,9 +46,7 @@ class Scenario:
         if not isinstance(self.crane, Crane):
             raise InvalidValue(f"crane = {self.crane!r}: must be a Crane")
         if not isinstance(self.motion, ComponentMotion | TabledMotion):
-            raise InvalidValue(
-                f"motion = {self.motion!r}: must be a ship motion (HarmonicMotion, SeaMotion, ...)"
-            )
+            raise InvalidValue(f"motion = {self.motion!r}: must be a ship motion (HarmonicMotion, SeaMotion, ...)")
         require_number("load_mass", self.load_mass, "kg", low=0.0, high=1e7, low_open=True)
         require_number("target_level", self.target_level, "m")
         require_number("rope_damping", self.rope_damping, "N s/m", low=0.0, high=1e8)
@@ -102,9 +100,7 @@ class Scenario:
         return math.sqrt(self.rope_stiffness / self.load_mass)
 
 
-def _require_range(
-    name: str, value: Range, unit: str, low: float, high: float, low_open: bool = False
-) -> None:
+def _require_range(name: str, value: Range, unit: str, low: float, high: float, low_open: bool = False) -> None:
     if isinstance(value, tuple):
         if len(value) != 2:
             raise InvalidValue(f"{name} = {value!r}: must be a number or a pair (low, high) in {unit}")
@@ -182,7 +178,7 @@ class ScenarioDistribution:
     def _build(self, u_sea: np.ndarray, u_load: np.ndarray, u_rope: np.ndarray) -> Scenario:
         s, m, r = u_sea.tolist(), u_load.tolist(), u_rope.tolist()
         hs, tp = _draw(self.hs, s[0]), _draw(self.tp, s[1])
-        gamma = dnv_gamma(hs, tp) if self.gamma == "dnv" else _draw(self.gamma, s[3])  # type: ignore[arg-type]
+        gamma = dnv_gamma(hs, tp) if self.gamma == "dnv" else _draw(self.gamma, s[3])
         sea = Sea(
             hs=hs,
             tp=tp,

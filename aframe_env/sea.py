@@ -192,7 +192,8 @@ def _quantile(table: FloatArray, probability: float) -> float:
     place = probability * (table.shape[0] - 1)
     low = min(int(place), table.shape[0] - 2)
     weight = place - low
-    return (1.0 - weight) * table[low] + weight * table[low + 1]
+    value: float = (1.0 - weight) * table[low] + weight * table[low + 1]
+    return value
 
 
 @kernel

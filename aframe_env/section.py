@@ -123,9 +123,7 @@ class RectangularHollow:
     def __post_init__(self) -> None:
         _positive(side_2=self.side_2, side_3=self.side_3, wall=self.wall)
         if 2.0 * self.wall >= min(self.side_2, self.side_3):
-            raise InvalidValue(
-                f"wall = {self.wall} m: must be in (0, {0.5 * min(self.side_2, self.side_3):g}) m"
-            )
+            raise InvalidValue(f"wall = {self.wall} m: must be in (0, {0.5 * min(self.side_2, self.side_3):g}) m")
 
     def given(self) -> GivenSection:
         """Return the section's constants."""
@@ -271,9 +269,7 @@ class ISection:
             StressPoint(tip, h / 2, 0.0, 0.0, tf / torsion),
             StressPoint(0.0, h / 2, flange_shear, 0.25 * b * hm / moment_2, tf / torsion),
             StressPoint(tw / 2, clear / 2, 0.0, b * tf * hm / 2 / (moment_2 * tw), max(tf, tw) / torsion),
-            StressPoint(
-                tw / 2, 0.0, 0.0, (b * tf * hm / 2 + tw * clear**2 / 8) / (moment_2 * tw), tw / torsion
-            ),
+            StressPoint(tw / 2, 0.0, 0.0, (b * tf * hm / 2 + tw * clear**2 / 8) / (moment_2 * tw), tw / torsion),
         )
         return GivenSection(
             area=area,
@@ -337,9 +333,7 @@ class Servomotor:
         if self.stiffness is not None:
             require_number("stiffness", self.stiffness, "N/m", low=0.0, low_open=True)
         elif self.damping:
-            raise InvalidValue(
-                f"damping = {self.damping} N s/m: a rigid servomotor (stiffness None) has none"
-            )
+            raise InvalidValue(f"damping = {self.damping} N s/m: a rigid servomotor (stiffness None) has none")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -359,6 +353,4 @@ class FrameStructure:
             value = getattr(self, name)
             pieces = value if isinstance(value, tuple) else (value,)
             if not pieces or not all(isinstance(piece, Section) for piece in pieces):
-                raise InvalidValue(
-                    f"{name} = {value!r}: must be a section, or a tuple of one or more sections"
-                )
+                raise InvalidValue(f"{name} = {value!r}: must be a section, or a tuple of one or more sections")

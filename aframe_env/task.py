@@ -153,8 +153,7 @@ def report_kernel(lanes: int) -> Callable[..., None]:
             state[i, 11] = row[at.TENSION * lanes + j]
             state[i, 12] = row[at.MASS * lanes + j]
             state[i, 13] = (
-                row[at.FREE_LENGTH * lanes + j]
-                + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
+                row[at.FREE_LENGTH * lanes + j] + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
             )
             results[i, TIME] = row[at.TIME * lanes + j]
             for k in range(3):
@@ -166,7 +165,7 @@ def report_kernel(lanes: int) -> Callable[..., None]:
             results[i, COST] = row[at.STEP_COST * lanes + j]
             results[i, PARTED] = row[at.PARTED * lanes + j]
 
-    return report  # type: ignore[no-any-return]
+    return report
 
 
 def sensed_truth(state: npt.NDArray[np.float64], angles: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

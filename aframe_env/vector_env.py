@@ -93,7 +93,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         """The rows' present scenarios."""
         return tuple(self._simulation.scenarios)
 
-    @property
+    @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """The rows' generators."""
         return tuple(self._generator(i) for i in range(self.num_envs))
@@ -114,9 +114,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         mask = self._reset_mask(options.pop("reset_mask", None))
         scenarios = self._scenario_option(options.pop("scenario", None))
         if options:
-            raise InvalidValue(
-                f"options: unknown key {sorted(options)[0]!r}: must be 'scenario' or 'reset_mask'"
-            )
+            raise InvalidValue(f"options: unknown key {sorted(options)[0]!r}: must be 'scenario' or 'reset_mask'")
         seeds = self._seed_list(seed)
         for index in np.flatnonzero(mask).tolist():
             if seeds[index] is not None:
@@ -163,8 +161,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
     def get_state(self) -> tuple[EnvState, ...]:
         """Return everything that the rows' further life depends on (not between an end and its reset step)."""
         return tuple(
-            EnvState(self._simulation.copy_row(i), self._generator(i).bit_generator.state)
-            for i in range(self.num_envs)
+            EnvState(self._simulation.copy_row(i), self._generator(i).bit_generator.state) for i in range(self.num_envs)
         )
 
     def set_state(self, state: Sequence[EnvState]) -> None:
@@ -195,9 +192,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
     def _commands(self, actions: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
         commands = np.asarray(actions, dtype=np.float64)
         if commands.shape != (self.num_envs, 1):
-            raise InvalidValue(
-                f"actions of shape {commands.shape}: must be of shape ({self.num_envs}, 1), rad/s"
-            )
+            raise InvalidValue(f"actions of shape {commands.shape}: must be of shape ({self.num_envs}, 1), rad/s")
         commands = commands[:, 0]
         if not np.isfinite(commands).all():
             row = int(np.flatnonzero(~np.isfinite(commands))[0])
@@ -208,9 +203,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         if mask is None:
             return self._everything.copy()
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
-            raise InvalidValue(
-                f"options['reset_mask'] = {mask!r}: must be a bool array of shape ({self.num_envs},)"
-            )
+            raise InvalidValue(f"options['reset_mask'] = {mask!r}: must be a bool array of shape ({self.num_envs},)")
         if not mask.any():
             raise InvalidValue("options['reset_mask']: must select at least one row")
         return mask
@@ -219,9 +212,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         if option is None or isinstance(option, Scenario):
             return None if option is None else [option] * self.num_envs
         if not isinstance(option, Sequence) or len(option) != self.num_envs:
-            raise InvalidValue(
-                f"options['scenario']: must be a Scenario or a sequence of {self.num_envs} of them"
-            )
+            raise InvalidValue(f"options['scenario']: must be a Scenario or a sequence of {self.num_envs} of them")
         return option
 
     def _seed_list(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:

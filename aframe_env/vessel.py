@@ -20,11 +20,7 @@ ComplexArray = npt.NDArray[np.complex128]
 COLUMNS = (
     "omega_rad_s",
     "heading_deg",
-    *(
-        f"{dof}_{part}"
-        for dof in ("surge", "sway", "heave", "roll", "pitch", "yaw")
-        for part in ("amp", "phase")
-    ),
+    *(f"{dof}_{part}" for dof in ("surge", "sway", "heave", "roll", "pitch", "yaw") for part in ("amp", "phase")),
 )
 
 # Ship axes (x forward, y to port) to the deck's (x aft, y to starboard): half a turn about z.

@@ -62,9 +62,7 @@ def features(observation: npt.NDArray[np.float32], quantities: tuple[Quantity, .
         "load_velocity_z": 2.0 * column["load_velocity_z"] if "load_velocity_z" in column else None,
         "load_acceleration_z": 4.0 * excess,
         "pulley_velocity_z": column["pulley_velocity_z"],
-        "pulley_acceleration_z": column["pulley_acceleration_z"]
-        if "pulley_acceleration_z" in column
-        else None,
+        "pulley_acceleration_z": column.get("pulley_acceleration_z"),
         "drum_speed": 0.75 * column["drum_speed"],
         "stretch_deviation": 4.0 * excess * mass * GRAVITY * length / _TYPICAL_STIFFNESS,
         "pulley_heave": 0.5 * column["pulley_heave"],
@@ -75,4 +73,4 @@ def features(observation: npt.NDArray[np.float32], quantities: tuple[Quantity, .
         "bobbing_rate": 0.25 * np.sqrt(_TYPICAL_STIFFNESS / (mass * length)) - 1.0,
     }
     stack = np.stack([np.asarray(derived[name]) for name in feature_names(quantities)], axis=1)
-    return np.clip(stack, -20.0, 20.0).astype(np.float32)
+    return np.asarray(np.clip(stack, -20.0, 20.0), dtype=np.float32)

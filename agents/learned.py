@@ -66,9 +66,7 @@ class LearnedPolicy:
         self._quantities = STATE if self.card.observation == "state" else SENSED
         expected = feature_names(self._quantities)
         if self.card.features != expected:
-            raise InvalidValue(
-                f"the agent's features are {self.card.features}, this version makes {expected}"
-            )
+            raise InvalidValue(f"the agent's features are {self.card.features}, this version makes {expected}")
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes; the agent looks at nothing of them."""
@@ -81,7 +79,7 @@ class LearnedPolicy:
         """Drum speed commands (N,) rad/s."""
         with torch.no_grad():
             share = self.actor(torch.from_numpy(features(observation, self._quantities)))
-        return self.card.speed_limit * share[:, 0].double().numpy()
+        return np.asarray(self.card.speed_limit * share[:, 0].double().numpy())
 
     def predict(self, observation: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
         """Action (1,) rad/s for one observation (K,) of the environment."""
@@ -107,7 +105,8 @@ def sensors_from_dict(data: dict[str, Any] | None) -> Sensors | None:
     """Sensors from plain data."""
     if data is None:
         return None
-    return Sensors(**{k: Channel(**v) if isinstance(v, dict) else v for k, v in data.items()})
+    values: dict[str, Any] = {k: Channel(**v) if isinstance(v, dict) else v for k, v in data.items()}
+    return Sensors(**values)
 
 
 def card_text(card: AgentCard) -> str:

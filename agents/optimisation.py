@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, Literal
 
 import numpy as np
@@ -131,19 +132,19 @@ def optimise(
 Sample = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 
-def _spline_start(
-    objective: Objective, needed: FloatArray, intervals: int
-) -> tuple[FloatArray, FloatArray, Sample]:
+def _spline_start(objective: Objective, needed: FloatArray, intervals: int) -> tuple[FloatArray, FloatArray, Sample]:
     angle, speed = spline_matrices(objective.duration, intervals, objective.times)
     # Least squares, not mere interpolation: with few intervals the knots share the error.
     x = np.linalg.lstsq(angle, needed, rcond=None)[0]
     scale = np.full(intervals, 1.0 / objective.scenario.crane.winch.drum_radius)
-    return x, scale, lambda v: (angle @ v, speed @ v)
+
+    def sample(v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return angle @ v, speed @ v
+
+    return np.asarray(x, dtype=np.float64), scale, sample
 
 
-def _harmonic_start(
-    objective: Objective, needed: FloatArray, harmonics: int
-) -> tuple[FloatArray, FloatArray, Sample]:
+def _harmonic_start(objective: Objective, needed: FloatArray, harmonics: int) -> tuple[FloatArray, FloatArray, Sample]:
     """Harmonics taken one by one from the residual's spectrum, all fitted anew after each."""
     times = objective.times
     taken = slice(None, None, max(1, len(times) // 600))  # enough for waves; the fit stays quick
@@ -153,9 +154,9 @@ def _harmonic_start(
         residual = y - harmonic_samples(x, t)[0]
         guess = _strongest(t, residual)
         x = least_squares(
-            lambda v: harmonic_samples(v, t)[0] - y,
+            partial(_residual, t=t, y=y),
             np.concatenate([x, guess]),
-            jac=lambda v: _jacobian(v, t),
+            jac=partial(_jacobian, t=t),
             x_scale=np.tile([1.0, 0.1, 1.0], len(x) // 3 + 1),
             max_nfev=60,
         ).x
@@ -182,6 +183,10 @@ def _strongest(t: FloatArray, signal: FloatArray) -> FloatArray:
     return np.array([np.hypot(s, c), frequency, np.arctan2(c, s)])
 
 
+def _residual(variables: FloatArray, t: FloatArray, y: FloatArray) -> FloatArray:
+    return harmonic_samples(variables, t)[0] - y
+
+
 def _jacobian(variables: FloatArray, t: FloatArray) -> FloatArray:
     """Derivatives of the harmonic drive's angle by its variables: (T, 3 n)."""
     a, w, p = variables.reshape(-1, 3).T
@@ -194,18 +199,14 @@ def _jacobian(variables: FloatArray, t: FloatArray) -> FloatArray:
 class _Search:
     """Nelder-Mead with restarts, counting its evaluations."""
 
-    def __init__(
-        self, objective: Objective, budget: int, rng: np.random.Generator, progress: Progress | None
-    ) -> None:
+    def __init__(self, objective: Objective, budget: int, rng: np.random.Generator, progress: Progress | None) -> None:
         self.objective = objective
         self.evaluations = 0
         self._budget = budget
         self._rng = rng
         self._progress = progress
 
-    def run(
-        self, x: FloatArray, scale: FloatArray, sample: Sample, name: ObjectiveName, until: int
-    ) -> FloatArray:
+    def run(self, x: FloatArray, scale: FloatArray, sample: Sample, name: ObjectiveName, until: int) -> FloatArray:
         """Best variables found from ``x`` before ``until`` evaluations; one unit of scale is a metre of rope."""
         centre = x
         size = len(x)

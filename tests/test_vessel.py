@@ -55,9 +55,7 @@ def test_port_and_starboard_mirror() -> None:
     np.testing.assert_allclose(a * [1, -1, 1, -1, 1, -1], b, atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("degrees", "dof", "bound"), [(180, 2, 0.02), (180, 4, 0.002), (90, 2, 0.04), (0, 4, 0.004)]
-)
+@pytest.mark.parametrize(("degrees", "dof", "bound"), [(180, 2, 0.02), (180, 4, 0.002), (90, 2, 0.04), (0, 4, 0.004)])
 def test_like_a_real_supply_ship(degrees: float, dof: int, bound: float) -> None:
     # Another hull of the same main dimensions by another program: amplitudes below 0.75 rad/s (8.4 s and longer), in
     # m/m and rad/m. Their greatest pitch is 0.041 rad/m. Phases of pitch differ with the hulls' fore-aft asymmetry.
@@ -107,9 +105,7 @@ def test_stern_of_ours_moves_like_theirs() -> None:
     stern = SUPPLY.response_at((-45.0, 0.0, 0.0))[:, j, 2]
     omega = np.linspace(0.2, 2.5, 4000)
     density = JONSWAP(omega)(2.5, 9.0, gamma=3.3)[1]
-    deviation = math.sqrt(
-        np.trapezoid(np.interp(omega, SUPPLY.frequencies, np.abs(stern)) ** 2 * density, omega)
-    )
+    deviation = math.sqrt(np.trapezoid(np.interp(omega, SUPPLY.frequencies, np.abs(stern)) ** 2 * density, omega))
     assert deviation == pytest.approx(_stern_heave(+1.0), rel=0.2)
 
 

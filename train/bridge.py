@@ -88,7 +88,7 @@ class TrainingVecEnv(VecEnv):
         self._error_sum = self._still_sum = 0.0
         return reduction
 
-    def reset(self) -> Float32Array:  # type: ignore[override]
+    def reset(self) -> Float32Array:
         """Start all rows at random times of their horizon, so that they do not all end at once."""
         self._restart(np.arange(self.num_envs))
         self._left = self._rng.integers(1, self._horizon + 1, self.num_envs)

@@ -167,7 +167,5 @@ def write_comparison(folder: Path, rows: Sequence[Row], entries: Sequence[Entry]
     for entry in entries:
         e = entry.episodes
         for i, values in enumerate(zip(e.rms, e.omega1, e.omega2, e.slack, e.parted, strict=True)):
-            writer.writerow(
-                [entry.policy, i, *(repr(float(v)) for v in values[:3]), *(int(v) for v in values[3:])]
-            )
+            writer.writerow([entry.policy, i, *(repr(float(v)) for v in values[:3]), *(int(v) for v in values[3:])])
     write_text(folder / "comparison.csv", text.getvalue())

@@ -19,9 +19,7 @@ COLOURS = ("#8a8f98", "#0b6e99", "#d9822b", "#7a5195", "#c8553d", "#3a7d44", "#2
 def comparison_figure(path: Path, entries: Sequence[Entry], still: Episodes) -> None:
     """Share of scenarios above a heave reduction; and one scenario's depth error over time."""
     figure = Figure(figsize=(11.0, 7.6), layout="constrained")
-    profile, history, magnified = figure.subplot_mosaic(
-        [["p", "h"], ["p", "m"]], width_ratios=[1.0, 1.25]
-    ).values()
+    profile, history, magnified = figure.subplot_mosaic([["p", "h"], ["p", "m"]], width_ratios=[1.0, 1.25]).values()
     colour = {entry.policy: COLOURS[i % len(COLOURS)] for i, entry in enumerate(entries)}
     for entry in entries:
         reduction = np.sort(reductions(entry, still))

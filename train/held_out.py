@@ -32,7 +32,7 @@ def evaluate(policy: Policy, folder: Path, count: int, privileged: int, console:
     """
     distribution = ScenarioDistribution()
     scenarios = held_out_scenarios(distribution, count)
-    observation = "state" if policy.knows is Knowledge.STATE else "sensors"
+    observation: task.Observation = "state" if policy.knows is Knowledge.STATE else "sensors"
     with Progress(console=console) as progress:
         drives = optimise_all([distribution.nominal(), *scenarios[:privileged]], progress)
         entries = [_entry(DrumStill(), scenarios, observation, progress)]
@@ -42,9 +42,7 @@ def evaluate(policy: Policy, folder: Path, count: int, privileged: int, console:
             nominal = DrivePolicy(name=name, drives=drives[family][:1] * count)
             entries.append(_entry(nominal, scenarios, observation, progress))
         for name, family in FAMILIES if privileged else ():
-            known = DrivePolicy(
-                name=f"{name} for each scenario", drives=drives[family][1:], knows=Knowledge.FUTURE
-            )
+            known = DrivePolicy(name=f"{name} for each scenario", drives=drives[family][1:], knows=Knowledge.FUTURE)
             entries.append(_entry(known, scenarios[:privileged], observation, progress))
     rows = compare(entries, still)
     console.print(rich_table(rows))
@@ -70,9 +68,7 @@ def _optimise(family: Literal["spline", "harmonic"], scenario: Scenario) -> Opti
     return optimise(family, scenario, duration=DURATION)
 
 
-def _entry(
-    policy: Policy, scenarios: Sequence[Scenario], observation: task.Observation, progress: Progress
-) -> Entry:
+def _entry(policy: Policy, scenarios: Sequence[Scenario], observation: task.Observation, progress: Progress) -> Entry:
     bar = progress.add_task(policy.name, total=round(DURATION / 0.1))
     episodes = run(
         policy,

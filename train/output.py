@@ -18,7 +18,7 @@ from aframe_env.validation import InvalidValue
 REPORTED_PACKAGES = ("gymnasium", "stable-baselines3", "torch", "numpy", "scipy", "numba", "waveresponse")
 
 
-def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
+def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     """Let ``write`` fill a temporary file beside ``path``, then rename it: all or nothing."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
@@ -35,7 +35,7 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file, all or nothing."""
-    write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8") and None)
+    write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
 def write_json(path: Path, data: Any) -> None:
@@ -48,9 +48,7 @@ def new_folder(path: Path, *, overwrite: bool = False) -> Path:
     if path.exists() and not path.is_dir():
         raise InvalidValue(f"out = {str(path)!r}: is a file, must be a folder")
     if path.is_dir() and any(path.iterdir()) and not overwrite:
-        raise InvalidValue(
-            f"out = {str(path)!r}: exists and is not empty; choose another, or pass --overwrite"
-        )
+        raise InvalidValue(f"out = {str(path)!r}: exists and is not empty; choose another, or pass --overwrite")
     path.mkdir(parents=True, exist_ok=True)
     return path
 

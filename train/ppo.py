@@ -191,7 +191,7 @@ def to_policy(model: PPO, rows: TrainingVecEnv, options: Options) -> tuple[Learn
 
 def save(folder: Path, policy: LearnedPolicy, weights: bytes) -> None:
     """Write the agent: weights first, the card that vouches for them last."""
-    write_atomically(folder / WEIGHTS, lambda path: path.write_bytes(weights) and None)
+    write_atomically(folder / WEIGHTS, lambda path: path.write_bytes(weights))
     write_text(folder / CARD, card_text(policy.card))
 
 

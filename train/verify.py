@@ -112,9 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     kind.add_argument("--release", type=Path, metavar="FILE.toml", help="run one release of a static load")
     kind.add_argument("--dynamic", type=Path, metavar="FILE.toml", help="run one case with ship motion")
     parser.add_argument("--out", type=Path, metavar="FILE.json", help="where that case's result goes")
-    parser.add_argument(
-        "--folder", type=Path, default=Path("results/verification"), help="where table and pictures go"
-    )
+    parser.add_argument("--folder", type=Path, default=Path("results/verification"), help="where table and pictures go")
     given = parser.parse_args(arguments)
     try:
         for name, solve in CASE_KINDS.items():

@@ -102,9 +102,7 @@ def _section_fullness(options: Options) -> float:
     block = options.displacement / WATER_DENSITY / (options.length * options.beam * options.draught)
     section = block / waterplane
     if not 0.5 < section < 0.99:
-        raise InvalidValue(
-            f"displacement = {options.displacement:g} kg: does not go with the hull's dimensions"
-        )
+        raise InvalidValue(f"displacement = {options.displacement:g} kg: does not go with the hull's dimensions")
     return section / (1.0 - section)
 
 
@@ -157,7 +155,7 @@ def compute(options: Options, console: Console) -> tuple[FloatArray, FloatArray,
         ]
     )
     console.print(
-        f"{len(faces)} panels, displacement {mass:.4g} kg, LCB {buoyancy[0]:.2f} m, KG {height + options.draught:.2f} m, "
+        f"{len(faces)} panels, {mass:.4g} kg, LCB {buoyancy[0]:.2f} m, KG {height + options.draught:.2f} m, "
         f"GM_T {stiffness[3, 3] / (mass * GRAVITY):.3f} m"
     )
     # Fine where ships respond, coarse where they hardly do.
@@ -169,26 +167,17 @@ def compute(options: Options, console: Console) -> tuple[FloatArray, FloatArray,
     solver = cpt.BEMSolver()
     for i, w in enumerate(track(omega, "solving", console=console)):
         problems = [
-            cpt.RadiationProblem(body=body, radiating_dof=dof, omega=w, rho=WATER_DENSITY, g=GRAVITY)
-            for dof in DOFS
+            cpt.RadiationProblem(body=body, radiating_dof=dof, omega=w, rho=WATER_DENSITY, g=GRAVITY) for dof in DOFS
         ]
         problems += [
-            cpt.DiffractionProblem(body=body, wave_direction=b, omega=w, rho=WATER_DENSITY, g=GRAVITY)
-            for b in heading
+            cpt.DiffractionProblem(body=body, wave_direction=b, omega=w, rho=WATER_DENSITY, g=GRAVITY) for b in heading
         ]
         data = cpt.assemble_dataset(solver.solve_all(problems, progress_bar=False))
         order = {"influenced_dof": list(DOFS)}
         pair = {**order, "radiating_dof": list(DOFS)}
         # Capytaine's order of these two axes is (radiating, influenced).
-        added[i] = (
-            data["added_mass"].sel(pair).transpose("omega", "influenced_dof", "radiating_dof").values[0]
-        )
-        damping[i] = (
-            data["radiation_damping"]
-            .sel(pair)
-            .transpose("omega", "influenced_dof", "radiating_dof")
-            .values[0]
-        )
+        added[i] = data["added_mass"].sel(pair).transpose("omega", "influenced_dof", "radiating_dof").values[0]
+        damping[i] = data["radiation_damping"].sel(pair).transpose("omega", "influenced_dof", "radiating_dof").values[0]
         total = data["Froude_Krylov_force"] + data["diffraction_force"]
         force[i] = total.sel(order).transpose("omega", "wave_direction", "influenced_dof").values[0]
     viscous = _viscous_roll(omega, added[:, 3, 3], damping[:, 3, 3], inertia[3, 3], stiffness[3, 3], options)
@@ -246,8 +235,8 @@ def to_csv(
         f"""\
 # title: supply ship, parametric hull
 # reference_point_m: {reference[0]:.4f}, {reference[1]:.4f}, {reference[2]:.4f}
-# Hull: Lpp {options.length} m, beam {options.beam} m, draught {options.draught} m, {options.displacement / 1e3:.0f} t, \
-GM_T {options.metacentric_height} m, roll damping {options.roll_damping:.0%} of critical; zero speed, deep water.
+# Hull: Lpp {options.length} m, beam {options.beam} m, draught {options.draught} m, {options.displacement / 1e3:.0f} t,
+# GM_T {options.metacentric_height} m, roll damping {options.roll_damping:.0%} of critical; zero speed, deep water.
 # Source: computed with Capytaine {version("capytaine")} by python -m train.vessel. Licence: MIT, as the package.
 # Axes: x forward, y to port, z up, origin midships on the waterline. heading: direction the waves travel towards,
 # from the bow towards port (0 following sea, 90 towards port, 180 head sea). A wave Re(a exp(i w t)) at the

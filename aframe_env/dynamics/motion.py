@@ -155,9 +155,7 @@ def quintic(
 
 
 @scalar
-def on_quintic(
-    c0: float, c1: float, c2: float, c3: float, c4: float, c5: float, t: float
-) -> tuple[float, float]:
+def on_quintic(c0: float, c1: float, c2: float, c3: float, c4: float, c5: float, t: float) -> tuple[float, float]:
     """Position and velocity on the quintic."""
     position = c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
     velocity = c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * (5.0 * c5))))

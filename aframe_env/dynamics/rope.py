@@ -6,9 +6,7 @@ from aframe_env.dynamics.compiling import scalar
 
 
 @scalar
-def tension(
-    elongation: float, elongation_rate: float, length: float, axial_stiffness: float, damping: float
-) -> float:
+def tension(elongation: float, elongation_rate: float, length: float, axial_stiffness: float, damping: float) -> float:
     """Rope tension max(0, c_R Δ + d_R Δ'), N, with c_R = E_R F_R / l.
 
     ``length`` is the unstretched length l [m] between drum and load, ``elongation`` is Δ [m], ``damping`` is

@@ -38,8 +38,6 @@ def load_acceleration(
     u1, u2, u3 = s1 - x1, s2 - x2, s3 - x3
     distance = math.sqrt(u1 * u1 + u2 * u2 + u3 * u3 + 1e-18)
     rate = (u1 * (ds1 - v1) + u2 * (ds2 - v2) + u3 * (ds3 - v3)) / distance
-    force = tension(
-        distance + drum_to_pulley - length, rate - pay_out_speed, length, axial_stiffness, damping
-    )
+    force = tension(distance + drum_to_pulley - length, rate - pay_out_speed, length, axial_stiffness, damping)
     pull = force / (distance * mass)
     return pull * u1, pull * u2, pull * u3 - gravity, force

@@ -67,9 +67,7 @@ def drum_at(row: Array, lanes: int, j: int, elapsed: float, error: float) -> tup
 
 
 @scalar
-def pulley_at(
-    row: Array, lanes: int, j: int, elapsed: float
-) -> tuple[float, float, float, float, float, float]:
+def pulley_at(row: Array, lanes: int, j: int, elapsed: float) -> tuple[float, float, float, float, float, float]:
     """Pulley position and velocity of lane j, ``elapsed`` s into the segment."""
     c = at.PATH
     s1, d1 = on_quintic(
@@ -162,9 +160,7 @@ def inner_step(row: Array, index: int, lanes: int) -> None:
         ) = v1, v2, v3
         row[at.STEP_COST * lanes + j] += cost
         deviation = abs(x3 - row[at.TARGET * lanes + j])
-        row[at.OMEGA2 * lanes + j] = (
-            deviation if deviation > row[at.OMEGA2 * lanes + j] else row[at.OMEGA2 * lanes + j]
-        )
+        row[at.OMEGA2 * lanes + j] = deviation if deviation > row[at.OMEGA2 * lanes + j] else row[at.OMEGA2 * lanes + j]
         row[(at.WINCH + 4) * lanes + j] = error2 if active else error0
         row[at.DRUM_ANGLE * lanes + j] = angle2 if active else angle0
         row[at.DRUM_SPEED * lanes + j] = speed2 if active else speed0
@@ -192,9 +188,7 @@ def measure_tension(row: Array, lanes: int) -> None:
         w2 = row[(at.PULLEY + 4) * lanes + j] - row[(at.LOAD_VELOCITY + 1) * lanes + j]
         w3 = row[(at.PULLEY + 5) * lanes + j] - row[(at.LOAD_VELOCITY + 2) * lanes + j]
         distance = np.sqrt(u1 * u1 + u2 * u2 + u3 * u3 + 1e-18)
-        length = (
-            row[at.FREE_LENGTH * lanes + j] + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
-        )
+        length = row[at.FREE_LENGTH * lanes + j] + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
         rate = (u1 * w1 + u2 * w2 + u3 * w3) / distance - row[at.DRUM_RADIUS * lanes + j] * row[
             at.DRUM_SPEED * lanes + j
         ]

@@ -117,9 +117,7 @@ def _flag(data: Mapping[str, Any], name: str, default: bool) -> bool:
     return value
 
 
-def _number(
-    data: Mapping[str, Any], name: str, default: float, unit: str, low: float, low_open: bool = False
-) -> float:
+def _number(data: Mapping[str, Any], name: str, default: float, unit: str, low: float, low_open: bool = False) -> float:
     value = data.get(name, default)
     require_number(name, value, unit, low=low, low_open=low_open)
     return float(value)
@@ -158,9 +156,7 @@ def model_of(data: Mapping[str, Any], crane: Crane, default: tuple[int, int]) ->
     """The frame's model as finely divided as the file says."""
     rfes = data.get("rfes", list(default))
     if not isinstance(rfes, list) or len(rfes) != 2:
-        raise InvalidValue(
-            f"rfes = {rfes!r}: must be two integers, [elements of a leg, elements of the beam]"
-        )
+        raise InvalidValue(f"rfes = {rfes!r}: must be two integers, [elements of a leg, elements of the beam]")
     layout = data.get("layout", "one_chain")
     return frame_model(
         crane.frame,

@@ -48,9 +48,7 @@ def exact_frequencies(member: Member, ends: tuple[End, End], count: int, *, shea
     """
     section, material = member.section_at(0.0), member.material
     scale = math.sqrt(
-        material.young_modulus
-        * section.second_moment_2
-        / (material.density * section.area * member.length**4)
+        material.young_modulus * section.second_moment_2 / (material.density * section.area * member.length**4)
     )
     found: list[float] = []
     low, value = 0.05 * scale, _determinant(member, ends, 0.05 * scale, shear)
@@ -58,9 +56,7 @@ def exact_frequencies(member: Member, ends: tuple[End, End], count: int, *, shea
         high = low + 0.2 * scale
         next_value = _determinant(member, ends, high, shear)
         if value * next_value < 0.0:
-            root = brentq(
-                lambda omega: _determinant(member, ends, omega, shear), low, high, xtol=1e-12 * scale
-            )
+            root = brentq(lambda omega: _determinant(member, ends, omega, shear), low, high, xtol=1e-12 * scale)
             found.append(float(root) / (2.0 * math.pi))
         low, value = high, next_value
     return np.array(found)

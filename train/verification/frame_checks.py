@@ -95,9 +95,7 @@ def moment_error(case: dict[str, Any], reference: dict[str, Any]) -> float:
     errors = []
     for key, target in moments.items():
         value = np.array([case[key]["My"], case[key]["Mz"]])
-        errors.append(
-            float(np.linalg.norm(value - target) / max(float(np.linalg.norm(target)), 0.01 * largest))
-        )
+        errors.append(float(np.linalg.norm(value - target) / max(float(np.linalg.norm(target)), 0.01 * largest)))
     return max(errors)
 
 
@@ -196,9 +194,7 @@ def static_frame() -> list[Check]:
                 Row(quantity=f"{name}: worst of {key}", measured="", reference="", error=f"{value:.4%}")
                 for key, value in errors.items()
             ]
-        checks.append(
-            Check(name=title, bar=bar, measured=f"{worst:.3%} at worst", passed=worst <= limit, rows=rows)
-        )
+        checks.append(Check(name=title, bar=bar, measured=f"{worst:.3%} at worst", passed=worst <= limit, rows=rows))
     return [*checks, _static_order()]
 
 
@@ -265,9 +261,7 @@ def previous_model() -> Check:
             seconds[layout] = time.perf_counter() - begin
             counts[layout] = frame.unknowns
         one, three = results["one_chain"], results["three_beams"]
-        scale = {
-            key: max(abs(value), 1e-5 if key.startswith(("u_", "rot")) else 1e3) for key, value in one.items()
-        }
+        scale = {key: max(abs(value), 1e-5 if key.startswith(("u_", "rot")) else 1e3) for key, value in one.items()}
         gap = max(gap, *(abs(one[key] - three[key]) / scale[key] for key in one))
         ratio = frequencies["one_chain"] / frequencies["three_beams"] - 1.0
         gap = max(gap, float(np.max(np.abs(ratio))))

@@ -52,9 +52,7 @@ def _nodes(frame: FrameModel) -> tuple[Array, list[tuple[int, Array]]]:
 def _moved(frame: FrameModel, position: Array, factor: float) -> Array:
     places, carriers = _nodes(frame)
     shifts = [
-        frame.to_deck
-        @ frame.structure.bodies[index].displacement(place)
-        @ position[6 * index : 6 * index + 6]
+        frame.to_deck @ frame.structure.bodies[index].displacement(place) @ position[6 * index : 6 * index + 6]
         for index, place in carriers
     ]
     return np.asarray(places + factor * np.array(shifts))

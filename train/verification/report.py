@@ -31,8 +31,7 @@ def markdown(checks: Sequence[Check], heading: str, footer: str) -> str:
     """Summary table, then the figures of every check beside their references."""
     lines = [f"# {heading}", "", "| check | bar | measured | holds |", "| --- | --- | --- | --- |"]
     lines += [
-        f"| {check.name} | {check.bar} | {check.measured} | {'yes' if check.passed else '**no**'} |"
-        for check in checks
+        f"| {check.name} | {check.bar} | {check.measured} | {'yes' if check.passed else '**no**'} |" for check in checks
     ]
     for check in checks:
         if check.rows:

@@ -122,9 +122,7 @@ def _steiner(offset: Array) -> Array:
     return np.asarray(float(offset @ offset) * np.eye(3) - np.outer(offset, offset))
 
 
-def divide(
-    member: Member, elements: int, *, corrected_shear: bool = False
-) -> tuple[list[Segment], list[Spring]]:
+def divide(member: Member, elements: int, *, corrected_shear: bool = False) -> tuple[list[Segment], list[Spring]]:
     """Primary and secondary division of ``member``.
 
     Args:
@@ -187,6 +185,4 @@ def _spring(member: Member, middle: float, size: float, corrected_shear: bool) -
         bulge[4], bulge[5] = load[:, 2], -load[:, 1]
     stiffness = 1.0 / compliance
     # Two Kelvin–Voigt elements in a row, to first order in frequency: d = c² Σ d_k/c_k².
-    return Spring(
-        member=member, position=middle, stiffness=stiffness, damping=stiffness**2 * loss, bulge=bulge
-    )
+    return Spring(member=member, position=middle, stiffness=stiffness, damping=stiffness**2 * loss, bulge=bulge)

@@ -55,9 +55,7 @@ def servomotor_direction(frame: Frame, side: str, angle: float | None = None) ->
 
 def servomotor_rows(frame: Frame, structure: Structure) -> Array:
     """(2, n): how much shorter S_R and S_L get; the transpose times a tension is the force on the frame."""
-    return np.vstack(
-        [-servomotor_direction(frame, side) @ structure.translation(f"N_{side}") for side in ("R", "L")]
-    )
+    return np.vstack([-servomotor_direction(frame, side) @ structure.translation(f"N_{side}") for side in ("R", "L")])
 
 
 def _joint_rows(structure: Structure) -> list[Array]:
@@ -66,9 +64,7 @@ def _joint_rows(structure: Structure) -> list[Array]:
         block = np.zeros((6, structure.size))
         for index, sign in ((before, 1.0), (behind, -1.0)):
             body = structure.bodies[index]
-            block[:, 6 * index : 6 * index + 6] = sign * np.vstack(
-                [body.displacement(place), body.rotation()]
-            )
+            block[:, 6 * index : 6 * index + 6] = sign * np.vstack([body.displacement(place), body.rotation()])
         rows.append(block)
     return rows
 

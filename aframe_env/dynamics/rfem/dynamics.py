@@ -94,9 +94,7 @@ class DynamicCase:
         require_number("step", self.step, "s", low=0.0, low_open=True)
         require_number("output_interval", self.output_interval, "s", low=0.0, low_open=True)
         if self.output_interval > self.duration:
-            raise InvalidValue(
-                f"output_interval = {self.output_interval} s: must be in (0, {self.duration:g}] s"
-            )
+            raise InvalidValue(f"output_interval = {self.output_interval} s: must be in (0, {self.duration:g}] s")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -334,9 +332,7 @@ class _Run:
         scheme.finish(acceleration)
 
 
-def simulate(
-    crane: Crane, case: DynamicCase | None = None, *, model: FrameModel | None = None
-) -> DynamicResult:
+def simulate(crane: Crane, case: DynamicCase | None = None, *, model: FrameModel | None = None) -> DynamicResult:
     """Run the full model with rope, load and drum on a moving deck.
 
     Args:

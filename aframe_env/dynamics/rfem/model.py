@@ -153,9 +153,7 @@ class FrameModel:
         feet = reactions[..., first : first + 6].reshape(*reactions.shape[:-1], 2, 3)
         return np.asarray(feet @ self.to_deck.T)
 
-    def spring_forces(
-        self, position: Array, velocity: Array | None = None, field: Array | None = None
-    ) -> Array:
+    def spring_forces(self, position: Array, velocity: Array | None = None, field: Array | None = None) -> Array:
         """Section forces N, V2, V3, T, M2, M3 at the sdes, (…, n_sde, 6), N and N m (N tension positive).
 
         Args:

@@ -55,9 +55,7 @@ class SectionForces:
         field: Acceleration field that makes the weight, along {F}, (3,), m/s².
     """
 
-    def __init__(
-        self, model: FrameModel, position: Array, point_forces: Sequence[PointForce], field: Array
-    ) -> None:
+    def __init__(self, model: FrameModel, position: Array, point_forces: Sequence[PointForce], field: Array) -> None:
         self._model = model
         self._points = list(point_forces)
         self._field = field

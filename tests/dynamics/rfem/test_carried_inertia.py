@@ -65,9 +65,7 @@ def test_inertial_terms_equal_those_of_point_masses():
     position = coordinates(now)
     velocity, bending = shape * rate * np.cos(rate * now), -(rate**2) * position
     turn = states.rotation[2] @ frame.to_deck
-    spin, spin_up = (
-        getattr(states, name)[2] @ frame.to_deck for name in ("angular_velocity", "angular_acceleration")
-    )
+    spin, spin_up = (getattr(states, name)[2] @ frame.to_deck for name in ("angular_velocity", "angular_acceleration"))
 
     def skew(vector):
         return np.cross(np.eye(3), vector)

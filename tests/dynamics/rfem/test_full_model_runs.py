@@ -88,24 +88,18 @@ def test_energy_balance_with_losses_everywhere():
 
 
 def test_energy_balance_with_a_prescribed_drum():
-    drum = PrescribedDrum(
-        angle=lambda t: 1.5 * (1.0 - math.cos(0.7 * t)), rate=lambda t: 1.05 * math.sin(0.7 * t)
-    )
+    drum = PrescribedDrum(angle=lambda t: 1.5 * (1.0 - math.cos(0.7 * t)), rate=lambda t: 1.05 * math.sin(0.7 * t))
     assert _balance(Crane(), drum=drum).error < 1e-5
 
 
 def test_energy_balance_with_a_driven_drum():
-    drum = DrivenDrum(
-        inertia=5e4, torque=lambda t, a, w: -0.75 * 981e3 * (1 + 0.1 * math.sin(t)) - 2e5 * w - 1e5 * a
-    )
+    drum = DrivenDrum(inertia=5e4, torque=lambda t, a, w: -0.75 * 981e3 * (1 + 0.1 * math.sin(t)) - 2e5 * w - 1e5 * a)
     assert _balance(Crane(), drum=drum).error < 1e-5
 
 
 def test_halving_the_step_is_second_order():
     runs = [
-        simulate(Crane(), DynamicCase(step=h, duration=10.0, output_interval=0.1), model=model(5, 2)).load[
-            :, 2
-        ]
+        simulate(Crane(), DynamicCase(step=h, duration=10.0, output_interval=0.1), model=model(5, 2)).load[:, 2]
         for h in (0.02, 0.01, 0.005)
     ]
     gaps = [np.abs(a - b).max() for a, b in ((runs[0], runs[1]), (runs[1], runs[2]))]
