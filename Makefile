@@ -3,13 +3,13 @@ PYTHON ?= python3
 ARGS ?=
 BIN := .venv/bin
 
-.PHONY: train test drives bench check clean
+.PHONY: train test verify bench check clean
 
 train: .venv/installed
 	$(BIN)/python -m train.ppo $(ARGS)
 
-drives: .venv/installed
-	$(BIN)/python -m train.drives $(ARGS)
+verify: .venv/installed
+	$(BIN)/python -m train.verify $(ARGS)
 
 test: .venv/installed-test
 	$(BIN)/python -m pytest $(ARGS)
@@ -28,7 +28,7 @@ bench: .venv/installed-test
 	$(PYTHON) -m venv .venv
 
 .venv/installed: pyproject.toml constraints.txt | .venv/bin/python
-	$(BIN)/python -m pip install --disable-pip-version-check -q -c constraints.txt -e '.[render]'
+	$(BIN)/python -m pip install --disable-pip-version-check -q -c constraints.txt -e .
 	touch $@
 
 .venv/installed-test: .venv/installed
