@@ -9,6 +9,7 @@ import gymnasium
 
 from aframe_env.crane import Crane, Frame, Rope, Winch
 from aframe_env.motion import Harmonic, HarmonicMotion
+from aframe_env.record import RecordedMotion
 from aframe_env.scenario import Scenario, ScenarioDistribution
 from aframe_env.sea import Sea, SeaMotion
 from aframe_env.sensors import Channel, Sensors
@@ -33,6 +34,7 @@ __all__ = [
     "Harmonic",
     "HarmonicMotion",
     "InvalidValue",
+    "RecordedMotion",
     "Rope",
     "Scenario",
     "ScenarioDistribution",

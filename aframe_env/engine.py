@@ -79,7 +79,7 @@ class Engine:
         self._components = at.padded(components)
         self._blocks = np.zeros((-(-rows // self._lanes), at.slots(self._components) * self._lanes))
         self._records = np.zeros((0, 18))
-        self._record_of: dict[int, tuple[TabledMotion, int, int]] = {}
+        self._known_records: dict[TabledMotion, tuple[int, int]] = {}
         # Lanes beyond the last row hold the paper's case, so that no lane computes with zeros for parameters.
         idle = self.row_vector(Scenario.paper())
         view = self._view
@@ -136,6 +136,20 @@ class Engine:
         block, lane = divmod(index, self._lanes)
         return self._view[block, :, lane].copy()
 
+    def restore_row(self, index: int, vector: FloatArray, scenario: Scenario) -> None:
+        """Put back a row of ``scenario`` that ``copy_row`` of this engine, or of another, returned."""
+        times = timing(scenario, self.control_period, self._max_inner_step)
+        if vector[at.CONTROL_PERIOD] != times.segment or vector[at.SUBSTEPS] != times.substeps:
+            raise InvalidValue(
+                f"set_state(): the state belongs to an environment with {vector[at.SUBSTEPS]:g} inner steps in "
+                f"{vector[at.CONTROL_PERIOD]:g} s: must be {times.substeps} in {times.segment:g} s, as here"
+            )
+        self._make_room((len(vector) - at.ROW_SLOTS) // at.COMPONENT_SLOTS)
+        vector = vector.copy()
+        if isinstance(scenario.motion, TabledMotion):
+            vector[at.RECORD], vector[at.RECORD_LENGTH] = self._record(scenario.motion, times.segment)
+        self.write_row(index, vector)
+
     def row_vector(self, scenario: Scenario) -> FloatArray:
         """Slots of a row at the start of a scenario: (slots,)."""
         times = timing(scenario, self.control_period, self._max_inner_step)
@@ -162,13 +176,13 @@ class Engine:
 
     def _record(self, motion: TabledMotion, segment: float) -> tuple[int, int]:
         """First line and length of a recorded motion in the table of records, which it is added to when new."""
-        known = self._record_of.get(id(motion))
+        known = self._known_records.get(motion)
         if known is None:
             table = motion.table(segment)
-            known = (motion, len(self._records), len(table))
+            known = (len(self._records), len(table))
             self._records = np.concatenate([self._records, table])
-            self._record_of[id(motion)] = known
-        return known[1], known[2]
+            self._known_records[motion] = known
+        return known
 
     def _make_room(self, components: int) -> None:
         """Widen the rows when a motion has more components than there is room for."""

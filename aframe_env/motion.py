@@ -70,12 +70,26 @@ class ComponentMotion(Protocol):
 class TabledMotion(Protocol):
     """A ship motion that is known on a table of times."""
 
+    @property
+    def duration(self) -> float:
+        """How long the motion is known, s."""
+        ...
+
     def table(self, period: float) -> FloatArray:
         """Coordinates, rates and accelerations every ``period`` s from time 0: (T, 18)."""
         ...
 
 
 ShipMotion = ComponentMotion | TabledMotion
+
+
+def require_coverage(motion: ShipMotion, name: str, duration: float) -> None:
+    """Raise unless the motion is known for ``duration`` s, which the user calls ``name``."""
+    rounding = 1e-9 * duration
+    if isinstance(motion, TabledMotion) and motion.duration < duration - rounding:
+        raise InvalidValue(
+            f"{name} = {duration:g} s: must be in (0, {motion.duration:g}] s, the length of the recorded motion {motion}"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,6 +13,7 @@ from gymnasium import spaces
 from aframe_env import task
 from aframe_env.dynamics import layout as at
 from aframe_env.engine import Engine
+from aframe_env.motion import require_coverage
 from aframe_env.scenario import Scenario, ScenarioDistribution, ScenarioSource
 from aframe_env.sensors import SensorBank, Sensors
 from aframe_env.validation import InvalidValue, require_choice, require_number
@@ -93,6 +94,7 @@ class Simulation:
             scenario = self.source if isinstance(self.source, Scenario) else self.source.draw(rng)
         elif not isinstance(scenario, Scenario):
             raise InvalidValue(f"options['scenario'] = {scenario!r}: must be a Scenario")
+        require_coverage(scenario.motion, "episode_duration", self.episode_duration)
         return scenario, noise_seed
 
     def reset_rows(self, indices: npt.NDArray[np.int64], drawn: list[tuple[Scenario, int]]) -> None:
@@ -135,7 +137,7 @@ class Simulation:
         """Put back what ``copy_row`` returned."""
         if (state.sensors is None) != (self._bank is None):
             raise InvalidValue("set_state(): the state belongs to an environment with another observation")
-        self._engine.write_row(index, state.engine)
+        self._engine.restore_row(index, state.engine, state.scenario)
         self.scenarios[index] = state.scenario
         self.steps[index] = state.step
         if self._bank is not None and state.sensors is not None:

@@ -19,6 +19,7 @@ from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.compiling import kernel, source_digest
 from aframe_env.dynamics.integrator import rk4_step
 from aframe_env.engine import Engine
+from aframe_env.motion import require_coverage
 from aframe_env.scenario import Scenario
 from aframe_env.validation import require_number
 from agents.drives import Drive
@@ -125,6 +126,7 @@ class Objective:
         """Lay out ``duration`` [s] in (0, 3600] of a scenario with inner steps of at most ``max_step`` s."""
         require_number("duration", duration, "s", low=0.0, high=3600.0, low_open=True)
         require_number("max_step", max_step, "s", low=2e-3, high=0.2)
+        require_coverage(scenario.motion, "duration", duration)
         self.scenario = scenario
         self.duration = float(duration)
         self.steps = max(1, math.ceil(duration / max_step - 1e-9))
