@@ -88,7 +88,8 @@ def require_coverage(motion: ShipMotion, name: str, duration: float) -> None:
     rounding = 1e-9 * duration
     if isinstance(motion, TabledMotion) and motion.duration < duration - rounding:
         raise InvalidValue(
-            f"{name} = {duration:g} s: must be in (0, {motion.duration:g}] s, the length of the recorded motion {motion}"
+            f"{name} = {duration:g} s: must be in (0, {motion.duration:g}] s, the length of the recorded motion "
+            f"{motion}"
         )
 
 

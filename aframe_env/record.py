@@ -54,18 +54,19 @@ class RecordedMotion:
     """(T,) s, increasing, in nearly equal steps; the first is where an episode starts."""
     coordinates: FloatArray = field(repr=False)
     """(T, 6): surge, sway, heave, m; roll, pitch, yaw, rad. Jumps of roll and yaw by 2π are taken out."""
-    source: str = "record"
-    """What error messages call the record."""
+    path: Path | None = None
+    """The file that it was read from, if it was."""
 
     def __post_init__(self) -> None:
+        source = "record" if self.path is None else str(self.path)
         times = np.array(self.times, dtype=np.float64)
         coordinates = np.array(self.coordinates, dtype=np.float64)
         if times.ndim != 1 or coordinates.shape != (len(times), 6):
             raise InvalidValue(
-                f"{self.source}: times of shape {times.shape} and coordinates of shape {coordinates.shape}: "
+                f"{source}: times of shape {times.shape} and coordinates of shape {coordinates.shape}: "
                 "must be (T,) and (T, 6)"
             )
-        _check(times, coordinates, [f"{self.source}, sample {i}" for i in range(len(times))], self.source)
+        _check(times, coordinates, [f"{source}, sample {i}" for i in range(len(times))], source)
         times -= times[0]
         for angle in (3, 5):
             coordinates[:, angle] = np.unwrap(coordinates[:, angle])
@@ -80,7 +81,7 @@ class RecordedMotion:
         """Read a record from a CSV file (see the module's docstring). Errors name file and line."""
         times, coordinates, lines = _read(Path(path))
         _check(times, coordinates, [f"{path}, line {line}" for line in lines], str(path))
-        return cls(times=times, coordinates=coordinates, source=str(path))
+        return cls(times=times, coordinates=coordinates, path=Path(path))
 
     @property
     def duration(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from importlib.resources import files
 from pathlib import Path
@@ -49,6 +49,8 @@ class Vessel:
     """m, in ship axes."""
     deck_position: tuple[float, float, float] = (-40.0, 0.0, 5.0)
     """Origin of the deck frame {D}, midway between the A-frame's feet, m, in ship axes: at the stern."""
+    path: Path | None = None
+    """The file that it was read from, if it was."""
 
     def __post_init__(self) -> None:
         require_vector("reference_point", self.reference_point, "m")
@@ -107,10 +109,9 @@ class Vessel:
             headings=headings,
             response=response,
             reference_point=reference,
+            path=path,
         )
-        if deck_position is None:
-            return vessel
-        return cls(**{**vars(vessel), "deck_position": deck_position})
+        return vessel if deck_position is None else replace(vessel, deck_position=deck_position)
 
     @classmethod
     def supply(cls) -> Vessel:
