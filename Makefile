@@ -3,10 +3,13 @@ PYTHON ?= python3
 ARGS ?=
 BIN := .venv/bin
 
-.PHONY: train test verify bench check clean
+.PHONY: train drives test verify bench check clean
 
 train: .venv/installed
 	$(BIN)/python -m train.ppo $(ARGS)
+
+drives: .venv/installed
+	$(BIN)/python -m train.drives $(ARGS)
 
 verify: .venv/installed
 	$(BIN)/python -m train.verify $(ARGS)

@@ -27,7 +27,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import tomli_w
 from cattrs import Converter, transform_error
@@ -120,7 +120,7 @@ def _converter(folder: Path) -> Converter:
 
     def section(value: Any, _: Any) -> Section:
         kind, rest = _kind(value, tuple(_SECTIONS))
-        return cast(Section, converter.structure(rest, _SECTIONS[kind]))
+        return converter.structure(rest, _SECTIONS[kind])
 
     def member(value: Any, _: Any) -> MemberSection:
         if isinstance(value, list):

@@ -1,4 +1,4 @@
-"""An open-loop drive as a policy: the drum speed that keeps the drum's own angle on φ_H(t)."""
+"""An open-loop drive as a policy: the drum speeds that bring the drum onto φ_H(t) and keep it there."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.scenario import Scenario
-from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue
 from agents.optimisation import OptimisedDrive
 from agents.policy import FloatArray, Knowledge
@@ -17,7 +16,11 @@ from agents.policy import FloatArray, Knowledge
 
 @dataclass
 class DrivePolicy:
-    """Follow a drive in every row, by the clock and the drum's encoder alone."""
+    """Follow a drive in every row, by the clock and the winch's limits alone.
+
+    The policy looks at no instrument: it reckons where its own commands have brought the drum, as the winch ramps at
+    its limit of acceleration. A drive that starts under way is caught up with first, since the drum starts at rest.
+    """
 
     name: str
     drives: Sequence[OptimisedDrive]
@@ -25,27 +28,43 @@ class DrivePolicy:
     knows: Knowledge = Knowledge.CLOCK
     """FUTURE where the drives were optimised for the very scenarios that they run in."""
     _period: float = field(init=False, default=0.1)
-    _acceleration: FloatArray = field(init=False, default_factory=lambda: np.zeros(0))
+    _limits: FloatArray = field(init=False, default_factory=lambda: np.zeros((2, 0)))
+    _drives: FloatArray = field(init=False, default_factory=lambda: np.zeros((2, 0, 1)))
+    _angle: FloatArray = field(init=False, default_factory=lambda: np.zeros(0))
+    _speed: FloatArray = field(init=False, default_factory=lambda: np.zeros(0))
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
-        """Begin N episodes; of the scenarios only the winch's acceleration limit is looked at."""
+        """Begin N episodes; of the scenarios only the winch's limits are looked at."""
         if len(scenarios) != len(self.drives):
             raise InvalidValue(f"drives: {len(self.drives)} drives for {len(scenarios)} scenarios")
         self._period = control_period
-        self._acceleration = np.array([s.crane.winch.max_acceleration for s in scenarios])
+        winches = [s.crane.winch for s in scenarios]
+        self._limits = np.array([[w.max_speed for w in winches], [w.max_acceleration for w in winches]])
+        # Sampled at the control steps once and for all; after its end a drive stands still.
+        steps = max((int(d.drive.duration / control_period) for d in self.drives), default=0) + 2
+        times = np.arange(steps) * control_period
+        self._drives = np.zeros((2, len(self.drives), steps))
+        for i, found in enumerate(self.drives):
+            drive = found.drive
+            self._drives[0, i] = drive.angle(np.minimum(times, drive.duration))
+            self._drives[1, i] = np.where(times < drive.duration, drive.speed(times), 0.0)
+        self._angle = np.zeros(len(scenarios))
+        self._speed = np.zeros(len(scenarios))
 
     def act(self, observation: npt.NDArray[np.float32], time: float) -> FloatArray:
-        """Drum speed commands (N,) rad/s that reach φ_H(t + T) at the end of the control step T.
-
-        A command differing by δ from the speed ramps at the winch's acceleration a, and turns the drum by
-        δ T - sign(δ) δ²/(2 a) more than the speed alone: solved for δ.
-        """
-        names = [q.name for q in (STATE if observation.shape[1] == len(STATE) else SENSED)]
-        angle = observation[:, names.index("drum_angle")].astype(np.float64)
-        speed = observation[:, names.index("drum_speed")].astype(np.float64)
-        end = time + self._period
-        wanted = np.array([float(d.drive.angle(min(end, d.drive.duration))) for d in self.drives])
-        period, a = self._period, self._acceleration
-        extra = wanted - angle - speed * period
-        root = np.sqrt(np.maximum(0.0, period**2 - 2.0 * np.abs(extra) / a))
-        return speed + np.sign(extra) * a * (period - root)
+        """Drum speed commands (N,) rad/s that bring the drum to φ_H(t + T) at the end of the control step T."""
+        period, (most, a) = self._period, self._limits
+        step, last = round(time / period), self._drives.shape[2] - 1
+        now = self._drives[0, :, min(step, last)]
+        later, speed = self._drives[:, :, min(step + 1, last)]
+        # A command that differs by δ from the speed ramps at a: it turns the drum by δ T - sign(δ) δ²/(2 a) more.
+        extra = later - self._angle - self._speed * period
+        exact = self._speed + np.sign(extra) * a * (period - np.sqrt(np.maximum(0.0, period**2 - 2.0 * abs(extra) / a)))
+        # Farther away: approach as fast as leaves room to brake at a quarter of the limit.
+        behind = now - self._angle
+        approach = speed + np.sign(behind) * np.minimum(abs(behind) / period, np.sqrt(0.5 * a * abs(behind)))
+        command = np.clip(np.where(abs(extra) < 0.375 * a * period**2, exact, approach), -most, most)
+        change = np.clip(command - self._speed, -a * period, a * period)
+        self._angle += self._speed * period + change * (period - 0.5 * abs(change) / a)
+        self._speed += change
+        return np.asarray(command)

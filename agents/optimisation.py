@@ -31,8 +31,8 @@ from agents.objectives import FINE_STEP, Objective, Outcome, coarse_step
 FloatArray = npt.NDArray[np.float64]
 Family = Literal["spline", "harmonic"]
 ObjectiveName = Literal["omega1", "omega2"]
-FAMILIES: Final = ("spline", "harmonic")
-OBJECTIVES: Final = ("omega1", "omega2")
+FAMILIES: Final[tuple[Family, ...]] = ("spline", "harmonic")
+OBJECTIVES: Final[tuple[ObjectiveName, ...]] = ("omega1", "omega2")
 Progress = Callable[[int, float], object]
 """Called with the number of evaluations so far and the best value of the objective."""
 
