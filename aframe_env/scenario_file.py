@@ -30,8 +30,7 @@ from pathlib import Path
 from typing import Any
 
 import tomli_w
-from cattrs import Converter, transform_error
-from cattrs.errors import BaseValidationError, ForbiddenExtraKeysError
+from cattrs import Converter
 
 from aframe_env.motion import HarmonicMotion, ShipMotion
 from aframe_env.record import RecordedMotion
@@ -47,6 +46,7 @@ from aframe_env.section import (
     StressPoint,
     Tube,
 )
+from aframe_env.structuring import strict_converter, structure, without_none
 from aframe_env.validation import InvalidValue, require_choice
 from aframe_env.vessel import Vessel
 
@@ -70,10 +70,7 @@ def read_scenario(path: str | Path) -> Scenario:
         raise InvalidValue(f"scenario = {str(path)!r}: cannot be read: {error}") from error
     except tomllib.TOMLDecodeError as error:
         raise InvalidValue(f"{path}: not TOML: {error}") from error
-    try:
-        return _converter(path.parent).structure(data, Scenario)
-    except (BaseValidationError, InvalidValue) as error:
-        raise InvalidValue(f"{path}: {_first(error)}") from error
+    return structure(_converter(path.parent), data, Scenario, str(path))
 
 
 def scenario_text(scenario: Scenario) -> str:
@@ -81,39 +78,11 @@ def scenario_text(scenario: Scenario) -> str:
 
     A vessel or a record that was not read from a file cannot be written, and raises ``InvalidValue``.
     """
-    return tomli_w.dumps(_without_none(_converter(Path()).unstructure(scenario)))
-
-
-def _first(error: BaseException) -> str:
-    """The first message of a tree of errors, with the key that it belongs to."""
-    if not isinstance(error, BaseValidationError):
-        return str(error)
-    message, _, place = transform_error(error, "", _message)[0].rpartition(" @ ")
-    key = place.removeprefix("$").strip(".")
-    return f"[{key}] {message}" if key else message
-
-
-def _message(error: BaseException, kind: type | None) -> str:
-    del kind
-    if isinstance(error, ForbiddenExtraKeysError):
-        return f"unknown key {sorted(error.extra_fields)[0]!r}"
-    if isinstance(error, KeyError):
-        return f"key {error.args[0]!r} is missing"
-    return str(error)
+    return tomli_w.dumps(without_none(_converter(Path()).unstructure(scenario)))
 
 
 def _converter(folder: Path) -> Converter:
-    converter = Converter(forbid_extra_keys=True)
-
-    def number(value: Any, _: type) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise InvalidValue(f"{value!r}: must be a number")
-        return float(value)
-
-    def exactly(value: Any, kind: type) -> Any:
-        if type(value) is not kind:
-            raise InvalidValue(f"{value!r}: must be of type {kind.__name__}")
-        return value
+    converter = strict_converter()
 
     def stress_point(value: Any, _: Any) -> StressPoint:
         return StressPoint(*converter.structure(value, tuple[float, float, float, float, float]))
@@ -133,9 +102,6 @@ def _converter(folder: Path) -> Converter:
             return converter.structure(rest, HarmonicMotion)
         return _recorded(rest, folder) if kind == "recorded" else _sea_motion(rest, folder, converter)
 
-    converter.register_structure_hook(float, number)
-    for kind in (int, bool, str):
-        converter.register_structure_hook(kind, exactly)
     converter.register_structure_hook(StressPoint, stress_point)
     converter.register_structure_hook_func(lambda kind: kind == MemberSection, member)
     converter.register_structure_hook_func(lambda kind: kind == Section, section)
@@ -202,10 +168,3 @@ def _recorded_table(motion: RecordedMotion) -> dict[str, Any]:
     if motion.path is None:
         raise InvalidValue("the recorded motion was not read from a file: a scenario file cannot name it")
     return {"kind": "recorded", "file": str(motion.path.resolve())}
-
-
-def _without_none(value: Any) -> Any:
-    """TOML has no null: what is None is left out, and read back as the default, None."""
-    if isinstance(value, dict):
-        return {key: _without_none(item) for key, item in value.items() if item is not None}
-    return [_without_none(item) for item in value] if isinstance(value, list | tuple) else value

@@ -7,16 +7,17 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import torch
+from safetensors import SafetensorError
 from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 
 from aframe_env.scenario import Scenario
-from aframe_env.sensors import Channel, Sensors
+from aframe_env.sensors import Sensors
+from aframe_env.structuring import strict_converter, structure
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue
 from agents.features import feature_names, features
@@ -35,7 +36,7 @@ class AgentCard:
     algorithm: str
     observation: str
     """"state" or "sensors"."""
-    sensors: dict[str, Any] | None
+    sensors: Sensors | None
     """The sensors that it was trained with."""
     features: tuple[str, ...]
     hidden: int
@@ -96,19 +97,6 @@ def digest(weights: bytes) -> str:
     return hashlib.sha256(weights).hexdigest()
 
 
-def sensors_to_dict(sensors: Sensors | None) -> dict[str, Any] | None:
-    """Sensors as plain data."""
-    return None if sensors is None else asdict(sensors)
-
-
-def sensors_from_dict(data: dict[str, Any] | None) -> Sensors | None:
-    """Sensors from plain data."""
-    if data is None:
-        return None
-    values: dict[str, Any] = {k: Channel(**v) if isinstance(v, dict) else v for k, v in data.items()}
-    return Sensors(**values)
-
-
 def card_text(card: AgentCard) -> str:
     """The card as JSON."""
     return json.dumps(asdict(card), indent=2, ensure_ascii=False) + "\n"
@@ -124,14 +112,16 @@ def load(folder: str | Path) -> LearnedPolicy:
         raise InvalidValue(f"no agent in {str(path)!r}: {error}") from error
     try:
         data = json.loads(text)
-        data["features"] = tuple(data["features"])
-        card = AgentCard(**data)
-    except (ValueError, TypeError, KeyError) as error:
-        raise InvalidValue(f"{path / CARD}: not an agent's card: {error}") from error
+    except ValueError as error:
+        raise InvalidValue(f"{path / CARD}: not JSON: {error}") from error
+    card = structure(strict_converter(), data, AgentCard, str(path / CARD))
     if card.format != FORMAT:
         raise InvalidValue(f"{path / CARD}: format = {card.format!r}: this version reads format {FORMAT}")
     if digest(weights) != card.sha256:
         raise InvalidValue(f"{path / WEIGHTS}: does not match the sha256 in {CARD}: damaged or not its file")
     actor = Actor(len(card.features), card.hidden)
-    actor.load_state_dict(load_tensors(weights))
+    try:
+        actor.load_state_dict(load_tensors(weights))
+    except (RuntimeError, SafetensorError) as error:
+        raise InvalidValue(f"{path / WEIGHTS}: not the weights of the network in {CARD}: {error}") from error
     return LearnedPolicy(actor, card)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import sys
 import tomllib
 from collections.abc import Sequence
@@ -11,7 +10,9 @@ from typing import Any, TypeVar
 
 import tomli_w
 import tyro
+from cattrs import Converter
 
+from aframe_env.structuring import strict_converter, structure, without_none
 from aframe_env.validation import InvalidValue
 
 T = TypeVar("T")
@@ -25,30 +26,19 @@ def read_toml(path: Path, kind: type[T]) -> T:
         raise InvalidValue(f"config = {str(path)!r}: cannot be read: {error}") from error
     except tomllib.TOMLDecodeError as error:
         raise InvalidValue(f"{path}: not TOML: {error}") from error
-    known = {f.name: f for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
-    for key in data:
-        if key not in known:
-            raise InvalidValue(f"{path}: unknown key {key!r}: must be one of {', '.join(sorted(known))}")
-    defaults = dataclasses.asdict(kind())  # type: ignore[call-overload]
-    for key, value in data.items():
-        expected = type(defaults[key]) if defaults[key] is not None else str
-        if expected is float and isinstance(value, int) and not isinstance(value, bool):
-            data[key] = float(value)
-        elif type(value) is not expected:
-            raise InvalidValue(f"{path}: {key} = {value!r}: must be of type {expected.__name__}")
-        if known[key].type in ("Path", "Path | None"):
-            data[key] = Path(value)
-    return kind(**data)
+    return structure(_converter(), data, kind, str(path))
 
 
 def to_toml(options: Any) -> str:
     """Options as TOML; what is not set is left out."""
-    data = {
-        key: str(value) if isinstance(value, Path) else value
-        for key, value in dataclasses.asdict(options).items()
-        if value is not None
-    }
-    return tomli_w.dumps(data)
+    return tomli_w.dumps(without_none(_converter().unstructure(options)))
+
+
+def _converter() -> Converter:
+    converter = strict_converter()
+    converter.register_structure_hook(Path, lambda value, _: Path(value))
+    converter.register_unstructure_hook(Path, str)
+    return converter
 
 
 def parse(kind: type[T], description: str, args: Sequence[str] | None = None) -> T:

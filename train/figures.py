@@ -39,7 +39,7 @@ def comparison_figure(path: Path, entries: Sequence[Entry], still: Episodes) -> 
     profile.set_ylabel("share of scenarios with at least this reduction")
     profile.set_ylim(0.0, 1.02)
     profile.grid(alpha=0.3)
-    profile.legend(loc="lower left", fontsize=9)
+    profile.legend(loc="center", bbox_to_anchor=(0.43, 0.4), fontsize=8)
     profile.set_title("Held-out scenarios (dashed: knows the future)", fontsize=11)
     example = int(np.argsort(still.rms)[len(still.rms) // 2])
     shown = min(len(e.episodes.rms) for e in entries)

@@ -28,7 +28,6 @@ from agents.learned import (
     LearnedPolicy,
     card_text,
     digest,
-    sensors_to_dict,
     serialise,
 )
 from train.actor_critic import TwoPathPolicy
@@ -176,7 +175,7 @@ def to_policy(model: PPO, rows: TrainingVecEnv, options: Options) -> tuple[Learn
     card = AgentCard(
         algorithm="PPO",
         observation=options.observation,
-        sensors=sensors_to_dict(Sensors() if options.observation == "sensors" else None),
+        sensors=Sensors() if options.observation == "sensors" else None,
         features=feature_names(rows.quantities),
         hidden=options.hidden,
         speed_limit=rows.speed_limit,
@@ -227,6 +226,8 @@ def train(options: Options, console: Console) -> int:
             model.learn(options.timesteps, callback=ShowReduction(progress, options.timesteps, rows))
         except KeyboardInterrupt:
             interrupted = True
+        finally:
+            model.logger.close()
     seconds = time.perf_counter() - begin
     policy, weights = to_policy(model, rows, options)
     save(folder, policy, weights)

@@ -1,0 +1,66 @@
+"""From plain data (TOML, JSON) to dataclasses and back: strict on types and keys, one clear error."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+from cattrs import Converter, transform_error
+from cattrs.errors import BaseValidationError, ForbiddenExtraKeysError
+
+from aframe_env.validation import InvalidValue
+
+T = TypeVar("T")
+
+
+def strict_converter() -> Converter:
+    """A converter that refuses unknown keys and turns no type into another, but an integer into a float."""
+    converter = Converter(forbid_extra_keys=True)
+
+    def number(value: Any, _: type) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InvalidValue(f"{value!r}: must be a number")
+        return float(value)
+
+    def exactly(value: Any, kind: type) -> Any:
+        if type(value) is not kind:
+            raise InvalidValue(f"{value!r}: must be of type {kind.__name__}")
+        return value
+
+    converter.register_structure_hook(float, number)
+    for kind in (int, bool, str):
+        converter.register_structure_hook(kind, exactly)
+    return converter
+
+
+def structure(converter: Converter, data: Any, kind: type[T], source: str) -> T:
+    """Make a ``kind`` of plain data. Raises ``InvalidValue`` that begins with ``source`` and names the key."""
+    try:
+        return converter.structure(data, kind)
+    except (BaseValidationError, InvalidValue) as error:
+        raise InvalidValue(f"{source}: {_first(error)}") from error
+
+
+def without_none(value: Any) -> Any:
+    """Leave out what is None, for TOML, which has no null: it reads back as the default."""
+    if isinstance(value, dict):
+        return {key: without_none(item) for key, item in value.items() if item is not None}
+    return [without_none(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def _first(error: BaseException) -> str:
+    """The first message of a tree of errors, with the key that it belongs to."""
+    if not isinstance(error, BaseValidationError):
+        return str(error)
+    message, _, place = transform_error(error, "", _message)[0].rpartition(" @ ")
+    key = place.removeprefix("$").strip(".")
+    return f"[{key}] {message}" if key else message
+
+
+def _message(error: BaseException, kind: type | None) -> str:
+    del kind
+    if isinstance(error, ForbiddenExtraKeysError):
+        known = ", ".join(sorted(name for name in getattr(error.cl, "__dataclass_fields__", {})))
+        return f"unknown key {sorted(error.extra_fields)[0]!r}: must be one of {known}"
+    if isinstance(error, KeyError):
+        return f"key {error.args[0]!r} is missing"
+    return str(error)

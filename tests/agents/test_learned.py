@@ -1,0 +1,120 @@
+import json
+
+import numpy as np
+import pytest
+import torch
+
+from aframe_env import InvalidValue, ScenarioDistribution
+from aframe_env.env import AFrameHeaveEnv
+from aframe_env.sensors import Sensors
+from aframe_env.task import SENSED, STATE
+from agents.features import feature_names, features
+from agents.learned import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, load, serialise
+from agents.network import Actor
+from agents.policy import Knowledge
+from agents.rollout import held_out_scenarios, run
+
+
+def agent(observation="state", hidden=8):
+    torch.manual_seed(1)
+    quantities = STATE if observation == "state" else SENSED
+    names = feature_names(quantities)
+    actor = Actor(len(names), hidden)
+    weights = serialise(actor)
+    card = AgentCard(
+        algorithm="PPO",
+        observation=observation,
+        sensors=None if observation == "state" else Sensors(),
+        features=names,
+        hidden=hidden,
+        speed_limit=4.0,
+        control_period=0.1,
+        seed=7,
+        timesteps=1234,
+        versions={"torch": "2"},
+        sha256=digest(weights),
+    )
+    return LearnedPolicy(actor, card), weights
+
+
+def write(folder, policy, weights, **changes):
+    (folder / WEIGHTS).write_bytes(weights)
+    (folder / CARD).write_text(json.dumps({**json.loads(card_text(policy.card)), **changes}))
+
+
+@pytest.mark.parametrize("observation", ["state", "sensors"])
+def test_an_agent_comes_back_from_its_folder_as_it_was(observation, tmp_path):
+    policy, weights = agent(observation)
+    write(tmp_path, policy, weights)
+    again = load(tmp_path)
+    assert again.card == policy.card
+    assert again.knows is (Knowledge.STATE if observation == "state" else Knowledge.SENSORS)
+    env = AFrameHeaveEnv(observation=observation)
+    observed, _ = env.reset(seed=0)
+    assert again.predict(observed).tobytes() == policy.predict(observed).tobytes()
+    assert env.action_space.contains(again.predict(observed))
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"sha256": "0" * 64}, "does not match the sha256"),
+        ({"format": 99}, "format = 99"),
+        ({"hidden": "8"}, r"\[hidden\] '8': must be of type int"),
+        ({"hidden": 9}, "not the weights of the network"),
+        ({"surprise": 1}, "unknown key 'surprise'"),
+        ({"features": [f"x{i}" for i in range(11)]}, "the agent's features are"),
+    ],
+)
+def test_files_that_do_not_belong_together_are_refused(changes, words, tmp_path):
+    policy, weights = agent()
+    write(tmp_path, policy, weights, **changes)
+    with pytest.raises(InvalidValue, match=words):
+        load(tmp_path)
+
+
+def test_damaged_weights_are_refused(tmp_path):
+    policy, weights = agent()
+    write(tmp_path, policy, weights[:-1] + b"\x00")
+    with pytest.raises(InvalidValue, match="sha256"):
+        load(tmp_path)
+
+
+def test_no_agent_and_no_json(tmp_path):
+    with pytest.raises(InvalidValue, match="no agent in"):
+        load(tmp_path / "absent")
+    (tmp_path / WEIGHTS).write_bytes(b"")
+    (tmp_path / CARD).write_text("{")
+    with pytest.raises(InvalidValue, match="not JSON"):
+        load(tmp_path)
+
+
+def test_another_control_period_is_refused():
+    policy, _ = agent()
+    with pytest.raises(InvalidValue, match="trained for 0.1 s"):
+        policy.reset([], 0.2)
+
+
+def test_an_agent_acts_alike_alone_and_in_a_batch():
+    policy, _ = agent()
+    scenarios = held_out_scenarios(ScenarioDistribution(), 3)
+    together = run(policy, scenarios, episode_duration=10.0)
+    alone = run(policy, scenarios[1:2], episode_duration=10.0)
+    np.testing.assert_allclose(together.error[1], alone.error[0], atol=1e-4)
+
+
+def test_features_are_of_order_one_over_the_distribution():
+    """Over drawn scenarios with the drum still no feature saturates, and none is always nearly zero."""
+    for observation, quantities in (("state", STATE), ("sensors", SENSED)):
+        env = AFrameHeaveEnv(observation=observation)
+        seen = []
+        for seed in range(12):
+            observed, _ = env.reset(seed=seed)
+            for _ in range(200):
+                observed = env.step(np.zeros(1, dtype=np.float32))[0]
+            seen.append(features(observed[None], quantities)[0])
+        spread = np.abs(np.array(seen)).max(axis=0)
+        names = feature_names(quantities)
+        moving = [i for i, name in enumerate(names) if name != "drum_speed"]
+        assert (spread < 20.0).all()
+        assert (spread[moving] > 0.01).all(), dict(zip(names, spread, strict=True))

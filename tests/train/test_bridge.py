@@ -1,0 +1,91 @@
+import numpy as np
+import pytest
+import torch
+from stable_baselines3.common.vec_env import VecEnv
+
+from aframe_env import ScenarioDistribution
+from aframe_env.env import AFrameHeaveEnv
+from aframe_env.task import STATE
+from agents.features import features
+from train.bridge import TrainingVecEnv
+from train.ppo import Options, build
+
+
+def bridge(rows=3, **changes):
+    arguments = {
+        "scenario": None,
+        "observation": "state",
+        "control_period": 0.1,
+        "episode_duration": 60.0,
+        "horizon": 2.0,
+        "drift_limit": 4.0,
+        "reward_scale": 1.0,
+        "seed": 5,
+        **changes,
+    }
+    return TrainingVecEnv(rows, **arguments)
+
+
+def test_rows_are_the_environments():
+    rows = bridge(horizon=60.0)
+    observed = rows.reset()
+    envs = []
+    for i, scenario in enumerate(rows._simulation.scenarios):
+        env = AFrameHeaveEnv(scenario=scenario)
+        first, _ = env.reset(seed=0)
+        np.testing.assert_array_equal(features(first[None], STATE)[0], observed[i])
+        envs.append(env)
+    actions = np.array([[0.1], [-0.2], [0.0]], dtype=np.float32)
+    for _ in range(8):
+        observed, rewards, finished, _ = rows.step(actions)
+        assert not finished.any()
+        for i, env in enumerate(envs):
+            want, reward, _, _, _ = env.step(np.array([4.0 * float(actions[i, 0])], dtype=np.float32))
+            np.testing.assert_allclose(observed[i], features(want[None], STATE)[0], atol=2e-5)
+            # The reward is the root mean square over the step, in place of the mean square.
+            assert rewards[i] == pytest.approx(-np.sqrt(-reward / 0.1), rel=1e-4, abs=1e-6)
+
+
+def test_rows_start_at_random_phases_and_finish_by_truncation():
+    rows = bridge(rows=40)
+    rows.reset()
+    finished_at = []
+    for step in range(20):
+        observed, _, finished, infos = rows.step(np.zeros((40, 1), dtype=np.float32))
+        for i in np.flatnonzero(finished):
+            finished_at.append(step)
+            assert infos[i]["TimeLimit.truncated"]
+            assert infos[i]["terminal_observation"].shape == observed[i].shape
+            assert not np.array_equal(infos[i]["terminal_observation"], observed[i])
+        assert all(not infos[i] for i in np.flatnonzero(~finished))
+    assert len(finished_at) == 40
+    assert len(set(finished_at)) > 10
+
+
+def test_a_drifting_row_starts_anew():
+    rows = bridge(horizon=60.0, drift_limit=0.5, scenario=ScenarioDistribution(hs=0.5))
+    rows.reset()
+    for _ in range(60):
+        _, _, finished, infos = rows.step(np.ones((3, 1), dtype=np.float32))
+        if finished.any():
+            break
+    assert infos[int(np.flatnonzero(finished)[0])]["TimeLimit.truncated"]
+    assert finished.any()
+
+
+def test_it_is_a_vec_env_that_learners_accept():
+    assert isinstance(bridge(), VecEnv)
+    model, _ = build(Options(n_envs=4, n_steps=8, batch_size=16, n_epochs=1))
+    before = {k: v.clone() for k, v in model.policy.state_dict().items()}
+    model.learn(64)
+    after = model.policy.state_dict()
+    assert any(not torch.equal(before[k], after[k]) for k in before)
+
+
+def test_the_plain_actor_is_the_learners_mean_action():
+    model, rows = build(Options(n_envs=4, n_steps=8, batch_size=16))
+    observed = rows.reset()
+    want, _ = model.predict(observed, deterministic=True)
+    with torch.no_grad():
+        got = model.policy.to_actor()(torch.from_numpy(observed))
+    np.testing.assert_allclose(got.numpy(), want, atol=1e-6)
