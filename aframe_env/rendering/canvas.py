@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -68,6 +67,10 @@ class Canvas:
         rect = _rect(box)
         share = np.linspace(0.0, 1.0, rect.height)[:, None]
         column = np.rint((1.0 - share) * ends[0] + share * ends[1]).astype(np.uint8)
+        if min(opacity) >= 1.0:
+            for y, colour in enumerate(column.tolist(), start=rect.top):
+                pygame.draw.line(self._fine, colour, (rect.left, y), (rect.right - 1, y))
+            return
         strip = pygame.image.frombuffer(column.tobytes(), (1, rect.height), "RGBA")
         self._fine.blit(pygame.transform.scale(strip, rect.size), rect)
 
@@ -85,18 +88,13 @@ class Canvas:
 
     def line(self, points: Points, colour: Colour, width: float = 1.5) -> None:
         """Draw a line through ``points`` with round joints and ends."""
-        fine = np.asarray(_fine(points))
-        half = 0.5 * width * _FINENESS
-        for start, end in zip(fine[:-1], fine[1:], strict=True):
-            along = end - start
-            length = math.hypot(along[0], along[1])
-            if length > 0.0:
-                across = np.array([-along[1], along[0]]) * (half / length)
-                corners = (start + across, end + across, end - across, start - across)
-                pygame.draw.polygon(self._fine, colour, corners)
-        if half > 1.0:
+        fine = _fine(points)
+        thickness = round(width * _FINENESS)
+        if len(fine) > 1:
+            pygame.draw.lines(self._fine, colour, False, fine, thickness)
+        if thickness > 2:
             for point in fine:
-                pygame.draw.circle(self._fine, colour, point, half)
+                pygame.draw.circle(self._fine, colour, point, 0.5 * thickness)
 
     def dashes(self, start: Point, end: Point, colour: Colour, width: float = 1.5, dash: float = 6.0) -> None:
         """Draw a dashed straight line, dash and gap ``dash`` pixels long."""
@@ -131,7 +129,8 @@ class Canvas:
         bold: bool = False,
     ) -> float:
         """Write ``text`` with its ``anchor`` at ``place``; return its width."""
-        image = _font(size, bold).render(text, True, colour)
+        # Hyphens stand before numbers only.
+        image = _font(size, bold).render(text.replace("-", "−"), True, colour)
         fine = (round(place[0] * _FINENESS), round(place[1] * _FINENESS))
         self._fine.blit(image, image.get_rect(**{anchor: fine}))
         return image.get_width() / _FINENESS

@@ -39,11 +39,11 @@ def draw_chart(canvas: Canvas, box: Box, time: float, history: FloatArray) -> No
         canvas.line([(place, y), (place, y + plot[3])], palette.GRID, 1.0)
         canvas.text(f"{tick:.0f} s", (place, y + plot[3] + 12.0), size=11, colour=palette.FADED, anchor="center")
     with canvas.within((x, y - 2.0, plot[2] + 6.0, plot[3] + 4.0)):
-        for column, colour, thickness in ((2, palette.HEAVE, 1.4), (1, palette.ERROR, 2.2)):
+        for column, colour, thickness in ((2, palette.HEAVE, 4.0), (1, palette.ERROR, 1.8)):
             curve = np.stack([x + plot[2] * (shown[:, 0] - start) / SPAN, middle - tall * shown[:, column]], axis=1)
             if len(curve):
                 canvas.line(curve, colour, thickness)
-                canvas.circle(curve[-1], 3.5, colour)
+                canvas.circle(curve[-1], thickness + 1.8, colour)
 
 
 def _draw_legend(canvas: Canvas, left: float, top: float) -> None:

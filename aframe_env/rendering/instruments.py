@@ -19,16 +19,17 @@ _SWEEP: Final = math.radians(125.0)
 
 def draw_instruments(canvas: Canvas, box: Box, scene: Scene) -> None:
     """Draw the card with all of them."""
-    left, top, width, height = box
+    left, top, width, _ = box
     canvas.box(box, palette.CARD, radius=8.0, edge=palette.EDGE)
-    _draw_dial(canvas, np.array([left + 82.0, top + 90.0]), scene)
+    _draw_dial(canvas, np.array([left + 88.0, top + 92.0]), scene)
     canvas.text("Winch drum", (left + 14.0, top + 17.0), size=13, bold=True)
+    canvas.text("command", (left + 14.0, top + 34.0), size=10, colour=palette.ERROR)
     x, right = left + 174.0, left + width - 14.0
     _draw_tension(canvas, (x, top + 17.0, right - x, 56.0), scene)
     for y, name, value in (
-        (100.0, "Load", f"{scene.load_mass / 1e3:.1f} t"),
-        (120.0, "Target", f"{scene.target_level:.1f} m"),
-        (140.0, "Drum angle", f"{scene.drum_angle:+.2f} rad"),
+        (100.0, "Rope breaks", f"{scene.crane.rope.breaking_load / 1e3:.0f} kN"),
+        (120.0, "Load", f"{scene.load_mass / 1e3:.1f} t"),
+        (140.0, "Drum angle", f"{scene.drum_angle:+.1f} rad"),
     ):
         canvas.text(name, (x, top + y), colour=palette.FADED)
         canvas.text(value, (right, top + y), anchor="midright")
@@ -76,7 +77,6 @@ def _draw_tension(canvas: Canvas, box: Box, scene: Scene) -> None:
     weight = left + width * min(scene.weight / breaking, 1.0)
     canvas.line([(weight, bar[1] - 3.0), (weight, bar[1] + bar[3] + 3.0)], palette.INK, 1.5)
     canvas.text("weight", (weight, bar[1] + 22.0), size=10, colour=palette.FADED, anchor="center")
-    canvas.text("breaks", (left + width, bar[1] + 22.0), size=10, colour=palette.FADED, anchor="midright")
 
 
 def _state(scene: Scene) -> tuple[str, Colour]:

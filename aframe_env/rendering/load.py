@@ -34,7 +34,6 @@ def draw_magnified(canvas: Canvas, box: Box, ship_scale: float, scene: Scene, hi
     left, top, width, height = box
     canvas.box(box, palette.CARD, radius=8.0, edge=palette.EDGE)
     error = scene.depth_error
-    canvas.text("Load, magnified", (left + 14.0, top + 17.0), size=13, bold=True)
     canvas.text(
         f"{error:+.3f} m" if abs(error) < 10.0 else f"{error:+.1f} m",
         (left + width - 14.0, top + 17.0),
@@ -52,14 +51,9 @@ def draw_magnified(canvas: Canvas, box: Box, ship_scale: float, scene: Scene, hi
         _draw_range(canvas, view, sea, recent, limit)
         _draw_ruler(canvas, view, sea, limit)
         _draw_error(canvas, view, sea, scene, limit)
+    written = canvas.text("Load", (left + 14.0, top + 17.0), size=13, bold=True)
     magnification = f"{view.scale / ship_scale:.2g} × the ship's scale"
-    canvas.text(
-        magnification,
-        (sea[0] + sea[2] - 8.0, sea[1] + sea[3] - 11.0),
-        size=10,
-        colour=palette.FOAM,
-        anchor="midright",
-    )
+    canvas.text(magnification, (left + 22.0 + written, top + 17.0), size=11, colour=palette.FADED)
 
 
 def _draw_range(canvas: Canvas, view: View, sea: Box, recent: FloatArray, limit: float) -> None:

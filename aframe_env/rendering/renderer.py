@@ -67,9 +67,9 @@ class Renderer:
         scene, history, canvas = scene_of(self._simulation, row), self._history.of(row), self._canvas
         canvas.box((0.0, 0.0, *SIZE), palette.PAGE)
         x, y = draw_side_view(canvas, _SIDE_VIEW, scene)
-        left, top, _, height = _MAGNIFIED
-        lens = [(x + 18.0, y - 14.0), (left, top + 8.0), (left, top + height - 8.0), (x + 18.0, y + 14.0)]
-        canvas.polygon(lens, palette.CARD, opacity=0.28)
+        left, bottom = _MAGNIFIED[0], _MAGNIFIED[1] + _MAGNIFIED[3]
+        lens = [(x + 18.0, y - 9.0), (left, bottom - 74.0), (left, bottom - 6.0), (x + 18.0, y + 9.0)]
+        canvas.polygon(lens, palette.FAR_WATER, opacity=0.45)
         draw_magnified(canvas, _MAGNIFIED, SCALE, scene, history)
         draw_instruments(canvas, _INSTRUMENTS, scene)
         draw_chart(canvas, _CHART, scene.time, history)

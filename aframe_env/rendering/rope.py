@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from aframe_env.rendering import palette
-from aframe_env.rendering.canvas import Box, Canvas, text_width
+from aframe_env.rendering.canvas import Box, Canvas
 from aframe_env.rendering.scene import Scene
 from aframe_env.rendering.ship import drum_on_picture
 from aframe_env.rendering.view import FloatArray, View
@@ -56,8 +56,8 @@ def _draw_rope(canvas: Canvas, points: FloatArray, scene: Scene) -> None:
     canvas.line(points, palette.WARNING if scene.slack or scene.parted else palette.ROPE, 2.0)
 
 
-def draw_gap(canvas: Canvas, box: Box, rope: float, scene: Scene) -> None:
-    """Draw the band that stands for the rope left out, with its length written beside the ``rope``'s pixel x."""
+def draw_gap(canvas: Canvas, box: Box, above: float, below: float, scene: Scene) -> None:
+    """Draw the band that stands for the rope left out, with its length; the rope's pixels x are given."""
     left, top, width, height = box
     x = np.arange(left - _TOOTH, left + width + 2.0 * _TOOTH, _TOOTH)
     tooth = np.where(np.arange(len(x)) % 2 == 0, -2.5, 2.5)
@@ -68,6 +68,6 @@ def draw_gap(canvas: Canvas, box: Box, rope: float, scene: Scene) -> None:
     canvas.line(lower, palette.FADED, 1.0)
     text = f"{scene.rope_length:.1f} m of rope"
     middle = top + 0.5 * height
-    canvas.text(text, (rope - 12.0 - text_width(text, 11, True), middle), size=11, bold=True)
-    for offset in (-4.0, 0.0, 4.0):
-        canvas.circle((rope, middle + offset), 1.2, palette.INK)
+    canvas.text(text, (min(above, below) - 12.0, middle), size=11, bold=True, anchor="midright")
+    for share in (0.25, 0.5, 0.75):
+        canvas.circle((above + share * (below - above), top + share * height), 1.3, palette.INK)

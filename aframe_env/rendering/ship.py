@@ -14,8 +14,8 @@ from aframe_env.rendering.view import FloatArray, View
 
 # A supply ship's stern in the deck frame, m: drawn, not computed with.
 _STERN, _BOW_SIDE, _HALF_BEAM = 1.6, -75.0, 9.0
-_WATERLINE: Final = -5.0
-_SIDE: Final = ((_BOW_SIDE, 0.9), (_STERN, 0.9), (_STERN, _WATERLINE), (_BOW_SIDE, _WATERLINE))
+_WATERLINE, _RAIL = -5.0, 0.35
+_SIDE: Final = ((_BOW_SIDE, _RAIL), (_STERN, _RAIL), (_STERN, _WATERLINE), (_BOW_SIDE, _WATERLINE))
 _UNDERWATER: Final = (
     (_BOW_SIDE, _WATERLINE),
     (_STERN, _WATERLINE),
@@ -25,8 +25,8 @@ _UNDERWATER: Final = (
     (-14.0, -11.0),
     (_BOW_SIDE, -11.0),
 )
-_HOUSE_AFT, _HOUSE_TOP = -27.0, 6.2
-_BRIDGE_AFT, _BRIDGE_TOP = -31.5, 10.6
+_HOUSE_AFT, _HOUSE_TOP = -27.0, 4.6
+_BRIDGE_AFT, _BRIDGE_TOP = -32.0, 8.6
 
 
 def draw_ship(canvas: Canvas, view: View, scene: Scene) -> None:
@@ -37,12 +37,12 @@ def draw_ship(canvas: Canvas, view: View, scene: Scene) -> None:
 
     near, far = -_HALF_BEAM, _HALF_BEAM
     deck = [(_BOW_SIDE, near, 0.0), (_STERN, near, 0.0), (_STERN, far, 0.0), (_BOW_SIDE, far, 0.0)]
-    canvas.polygon(side(_SIDE[:2] + ((_STERN, 0.0), (_BOW_SIDE, 0.0)), far), palette.HULL)
+    canvas.polygon(side((*_SIDE[:2], (_STERN, 0.0), (_BOW_SIDE, 0.0)), far), palette.HULL)
     canvas.polygon(view.pixels(scene.on_deck(deck)), palette.DECK)
     _draw_house(canvas, view, scene)
     canvas.polygon(side(_UNDERWATER, near), palette.BOTTOM)
     canvas.polygon(side(_SIDE, near), palette.HULL)
-    canvas.line(side(((_BOW_SIDE, 0.9), (_STERN, 0.9)), near), palette.CHROME, 1.5)
+    canvas.line(side(((_BOW_SIDE, _RAIL), (_STERN, _RAIL)), near), palette.CHROME, 1.5)
     canvas.line(side(((_BOW_SIDE, _WATERLINE), (_STERN, _WATERLINE)), near), palette.HOUSE, 1.5)
 
 
@@ -60,8 +60,8 @@ def _draw_house(canvas: Canvas, view: View, scene: Scene) -> None:
             canvas.polygon(view.pixels(scene.on_deck(window)), palette.WINDOW)
 
 
-def draw_frame(canvas: Canvas, view: View, scene: Scene) -> None:
-    """Draw the portal: legs from the feet A to the corners B, the top beam with S, the servomotors N-C."""
+def draw_frame_and_drum(canvas: Canvas, view: View, scene: Scene) -> None:
+    """Draw the portal: legs from the feet A to the corners B, the top beam with S, the servomotors N-C; the drum."""
     frame = scene.crane.frame
     sine, cosine = math.sin(frame.luffing_angle), math.cos(frame.luffing_angle)
 
@@ -75,9 +75,10 @@ def draw_frame(canvas: Canvas, view: View, scene: Scene) -> None:
     for y, colour in ((width, palette.STEEL_SHADE), (-width, palette.STEEL)):
         if y < 0.0:
             canvas.line([leg(width, frame.height), leg(-width, frame.height)], palette.STEEL_SHADE, 9.0)
+            _draw_drum(canvas, view, scene)
         foot, end = pixel(frame.servomotor_deck_x, y, 0.0), leg(y, frame.servomotor_height)
-        canvas.line([foot, end], palette.CHROME, 3.5)
-        canvas.line([foot, 0.45 * foot + 0.55 * end], palette.MACHINE, 6.5)
+        canvas.line([foot, end], palette.CHROME, 3.0)
+        canvas.line([foot, 0.45 * foot + 0.55 * end], palette.MACHINE, 5.0)
         canvas.line([pixel(0.0, y, 0.0), leg(y, frame.height)], colour, 8.0)
         for joint in (pixel(0.0, y, 0.0), foot, end):
             canvas.circle(joint, 3.5, palette.MACHINE)
@@ -88,7 +89,7 @@ def drum_on_picture(view: View, scene: Scene) -> tuple[FloatArray, float]:
     return view.pixels(scene.on_deck(scene.crane.drum_position)), view.scale * scene.crane.winch.drum_radius
 
 
-def draw_drum(canvas: Canvas, view: View, scene: Scene) -> None:
+def _draw_drum(canvas: Canvas, view: View, scene: Scene) -> None:
     """Draw the drum H; its spokes turn clockwise when it pays out."""
     centre, radius = drum_on_picture(view, scene)
     x, y, _ = scene.crane.drum_position

@@ -7,17 +7,17 @@ from typing import Final
 import numpy as np
 
 from aframe_env.rendering import palette
-from aframe_env.rendering.canvas import Box, Canvas
+from aframe_env.rendering.canvas import Box, Canvas, text_width
 from aframe_env.rendering.load import draw_load
 from aframe_env.rendering.palette import Colour
 from aframe_env.rendering.rope import draw_gap, draw_hanging, draw_hoist
 from aframe_env.rendering.scene import Scene
-from aframe_env.rendering.ship import draw_drum, draw_frame, draw_ship
+from aframe_env.rendering.ship import draw_frame_and_drum, draw_ship
 from aframe_env.rendering.view import FloatArray, View
 
 SCALE: Final = 11.0
 """Pixels per metre."""
-_RECESSION: Final = (0.18, 0.10)
+_RECESSION: Final = (0.30, 0.15)
 _AFT, _ABOVE = 13.5, 17.0
 """What is seen aft of the deck's origin and above it, m."""
 _BELOW: Final = 92.0
@@ -37,10 +37,9 @@ def draw_side_view(canvas: Canvas, box: Box, scene: Scene) -> tuple[float, float
         canvas.gradient(upper, palette.SKY_TOP, palette.SKY_LOW)
         _draw_water(canvas, view, upper, scene, _FAR, palette.FAR_WATER, 1.0)
         draw_ship(canvas, view, scene)
-        draw_drum(canvas, view, scene)
-        draw_frame(canvas, view, scene)
-        _draw_water(canvas, view, upper, scene, _NEAR, palette.NEAR_WATER, 0.72)
-        darker = float(view.pixels([0.0, 0.0, scene.water.level - 1.0])[1])
+        draw_frame_and_drum(canvas, view, scene)
+        _draw_water(canvas, view, upper, scene, _NEAR, palette.NEAR_WATER, 0.55)
+        darker = float(view.pixels([0.0, 0.0, scene.water.level - 2.0])[1])
         canvas.gradient(
             (left, darker, width, top + upper[3] - darker), palette.DEEP_WATER, palette.DEEP_WATER, (0.0, 0.8)
         )
@@ -52,7 +51,8 @@ def draw_side_view(canvas: Canvas, box: Box, scene: Scene) -> tuple[float, float
     with canvas.within(lower):
         place = _draw_depth(canvas, lower, view, scene)
     with canvas.within(box):
-        draw_gap(canvas, (left, top + upper[3] - 0.5 * _GAP, width, _GAP), float(place[0]), scene)
+        gap = (left, cut - 0.5 * _GAP, width, _GAP)
+        draw_gap(canvas, gap, _on_rope(view, scene, cut)[0], float(place[0]), scene)
     _draw_captions(canvas, left, top, scene)
     return float(place[0]), float(place[1])
 
@@ -92,7 +92,8 @@ def _draw_depth(canvas: Canvas, box: Box, view: View, scene: Scene) -> FloatArra
     target = top + 0.56 * height
     reach = 0.5 * height - 16.0
     error = max(-reach, min(SCALE * scene.depth_error, reach))
-    place = np.array([view.pixels(scene.load)[0], target - error])
+    x = min(max(float(view.pixels(scene.load)[0]), left + 24.0), left + width - 24.0)
+    place = np.array([x, target - error])
     canvas.dashes((left, target), (left + width, target), palette.TARGET, 1.2)
     slope = _on_rope(view, scene, 0.0) - _on_rope(view, scene, 1.0)
     if not scene.parted:
@@ -104,9 +105,11 @@ def _draw_depth(canvas: Canvas, box: Box, view: View, scene: Scene) -> FloatArra
 
 
 def _draw_captions(canvas: Canvas, left: float, top: float, scene: Scene) -> None:
-    canvas.text(f"{scene.time:.1f} s", (left + 14.0, top + 20.0), size=18, bold=True)
-    canvas.text(scene.motion, (left + 14.0, top + 42.0))
+    chip = max(96.0, text_width(scene.motion)) + 28.0
+    canvas.box((left, top, chip, 56.0), palette.PAGE)
+    canvas.text(f"{scene.time:.1f} s", (left + 14.0, top + 19.0), size=18, bold=True)
+    canvas.text(scene.motion, (left + 14.0, top + 41.0), colour=palette.FADED)
     if scene.slack or scene.parted:
         text = "rope parted: load lost" if scene.parted else "rope slack"
-        canvas.box((left + 14.0, top + 56.0, 168.0 if scene.parted else 92.0, 22.0), palette.WARNING, radius=5.0)
-        canvas.text(text, (left + 22.0, top + 67.0), colour=palette.CARD, bold=True)
+        canvas.box((left + 14.0, top + 66.0, 168.0 if scene.parted else 92.0, 22.0), palette.WARNING, radius=5.0)
+        canvas.text(text, (left + 22.0, top + 77.0), colour=palette.CARD, bold=True)

@@ -38,11 +38,11 @@ class View:
 
 
 def round_limit(value: float) -> float:
-    """Smallest of 0.05, 0.1, 0.2, 0.5, 1, 2, 5, ... that is not below ``value``."""
-    limit = 0.05
-    factors = (2.0, 2.0, 2.5)
-    step = 0
-    while limit < value * (1.0 - 1e-9):
-        limit *= factors[step % 3]
-        step += 1
-    return limit
+    """Smallest of 0.06, 0.1, 0.2, 0.3, 0.6, 1, 2, 3, 6, ... that is not below ``value``."""
+    decade = 0.01
+    while True:
+        for factor in (1.0, 2.0, 3.0, 6.0):
+            limit = factor * decade
+            if limit >= max(value, 0.06) * (1.0 - 1e-9):
+                return limit
+        decade *= 10.0
