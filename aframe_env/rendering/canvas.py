@@ -15,8 +15,8 @@ import pygame
 
 from aframe_env.rendering.palette import INK, Colour
 
-Points = Sequence[tuple[float, float]] | npt.NDArray[np.float64]
 Point = tuple[float, float] | npt.NDArray[np.float64]
+Points = Sequence[Point] | npt.NDArray[np.float64]
 Box = tuple[float, float, float, float]
 """Left, top, width, height."""
 Anchor = Literal["midleft", "center", "midright", "midbottom", "midtop"]
@@ -60,6 +60,13 @@ class Canvas:
         pygame.draw.rect(self._fine, colour, _rect(box), border_radius=round_off)
         if edge is not None:
             pygame.draw.rect(self._fine, edge, _rect(box), width=_FINENESS, border_radius=round_off)
+
+    def round_off(self, box: Box, beyond: Colour, radius: float) -> None:
+        """Round the corners of what is drawn in a box: colour what is ``radius`` beyond them."""
+        left, top, width, height = box
+        ring = _rect((left - radius, top - radius, width + 2.0 * radius, height + 2.0 * radius))
+        thickness = round(radius * _FINENESS)
+        pygame.draw.rect(self._fine, beyond, ring, width=thickness, border_radius=2 * thickness)
 
     def gradient(self, box: Box, top: Colour, bottom: Colour, opacity: tuple[float, float] = (1.0, 1.0)) -> None:
         """Fill a box with colours, and opacities, from ``top`` to ``bottom``."""

@@ -65,7 +65,7 @@ def _draw_range(canvas: Canvas, view: View, sea: Box, recent: FloatArray, limit:
     x = sea[0] + _RULER + 4.0
     corners = [(x, high - 1.0), (x + 7.0, high - 1.0), (x + 7.0, low + 1.0), (x, low + 1.0)]
     canvas.polygon(corners, palette.LOAD, opacity=0.75)
-    canvas.text(f"range of the last {MEMORY:.0f} s", (x, sea[1] + 11.0), size=10, colour=palette.FOAM)
+    canvas.text(f"last {MEMORY:.0f} s", (x, sea[1] + 11.0), size=10, colour=palette.FOAM)
 
 
 def _draw_ruler(canvas: Canvas, view: View, sea: Box, limit: float) -> None:

@@ -42,8 +42,8 @@ class Renderer:
 
     def frame(self, row: int = 0) -> npt.NDArray[np.uint8]:
         """Picture of a row, (height, width, 3)."""
-        pixels = pygame.surfarray.array3d(self._draw(row))
-        return np.ascontiguousarray(pixels.transpose(1, 0, 2), dtype=np.uint8)
+        pixels = pygame.image.tobytes(self._draw(row), "RGB")
+        return np.frombuffer(pixels, dtype=np.uint8).reshape(SIZE[1], SIZE[0], 3).copy()
 
     def show(self, frames_per_second: float, row: int = 0) -> None:
         """Show a row in the window, which opens at the first call, no sooner than the last one's time is over."""
@@ -67,6 +67,7 @@ class Renderer:
         scene, history, canvas = scene_of(self._simulation, row), self._history.of(row), self._canvas
         canvas.box((0.0, 0.0, *SIZE), palette.PAGE)
         x, y = draw_side_view(canvas, _SIDE_VIEW, scene)
+        canvas.round_off(_SIDE_VIEW, palette.PAGE, 8.0)
         left, bottom = _MAGNIFIED[0], _MAGNIFIED[1] + _MAGNIFIED[3]
         lens = [(x + 18.0, y - 9.0), (left, bottom - 74.0), (left, bottom - 6.0), (x + 18.0, y + 9.0)]
         canvas.polygon(lens, palette.FAR_WATER, opacity=0.45)

@@ -41,13 +41,12 @@ def draw_hanging(canvas: Canvas, top: FloatArray, bottom: FloatArray, scene: Sce
     """Draw a straight piece of the rope between two pixels: wavy where the rope is slack, a stub where it parted."""
     if scene.parted:
         bottom = top + 0.12 * (bottom - top)
-    count = 60
-    share = np.linspace(0.0, 1.0, count)
-    points = top + share[:, None] * (bottom - top)
+    points = np.stack([top, bottom])
     if scene.slack or scene.parted:
-        length = float(np.hypot(*(bottom - top)))
-        swing = 5.0 * np.sin(math.pi * share) ** 0.5 * np.sin(2.0 * math.pi * share * length / 34.0)
-        points[:, 0] += swing
+        share = np.linspace(0.0, 1.0, 80)
+        points = top + share[:, None] * (bottom - top)
+        waves = float(np.hypot(*(bottom - top))) / 34.0
+        points[:, 0] += 5.0 * np.sqrt(np.abs(np.sin(math.pi * share))) * np.sin(2.0 * math.pi * waves * share)
     _draw_rope(canvas, points, scene)
 
 
