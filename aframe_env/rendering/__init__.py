@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING
 
 from gymnasium.error import DependencyNotInstalled
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
 
 def open_renderer(simulation: Simulation) -> Renderer:
     """Return a renderer of the simulation's rows; raise ``DependencyNotInstalled`` where pygame is missing."""
+    # A greeting on standard output at import has no place in the output of who imports us.
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     try:
         import pygame  # noqa: F401
     except ImportError as error:
