@@ -18,7 +18,7 @@ from aframe_env.rendering.view import FloatArray, View
 SCALE: Final = 11.0
 """Pixels per metre."""
 _RECESSION: Final = (0.30, 0.15)
-_AFT, _ABOVE = 13.5, 17.0
+_AFT, _ABOVE = 14.5, 17.0
 """What is seen aft of the deck's origin and above it, m."""
 _BELOW: Final = 92.0
 """Height of the part about the load, pixels."""
@@ -82,7 +82,8 @@ def _draw_pulley_heave(canvas: Canvas, view: View, scene: Scene) -> None:
     canvas.line([(x + 8.0, y), (x + 26.0, y)], palette.INK, 1.2)
     if abs(rest - y) > 3.0:
         canvas.line([(x + 20.0, rest), (x + 20.0, y)], palette.INK, 1.6)
-    canvas.text(f"{scene.pulley_heave:+.2f} m", (x + 30.0, min(y, rest) - 9.0), size=11, bold=True)
+    canvas.text("heave", (x + 36.0, min(y, rest) - 22.0), size=10)
+    canvas.text(f"{scene.pulley_heave:+.2f} m", (x + 36.0, min(y, rest) - 9.0), size=11, bold=True)
 
 
 def _draw_depth(canvas: Canvas, box: Box, view: View, scene: Scene) -> FloatArray:
