@@ -1,7 +1,7 @@
 """Draw the environment: ``python -m train.render`` (extra ``render``).
 
-The drum stands still for the first half of the time; in the second it pays out as fast as the pulley rises, and slowly
-takes away what error is left, so that the picture's chart has the depth error without and with compensation.
+The drum stands still for the first half of the time; in the second it pays out as the pulley rises, so that the
+picture's chart has the depth error without and with compensation.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from aframe_env.validation import InvalidValue, require_integer, require_number
 from train.config import parse
 from train.output import user_errors, write_atomically
 
-_CORRECTION = 0.25
-"""Rope paid out for each metre of depth error, m/s: slow against the waves and the load's bobbing on the rope."""
+_CATCH_UP = 0.5
+"""Speed at which the rope paid out catches up with each metre of the pulley's heave, 1/s."""
 
 
 @dataclass(frozen=True)
@@ -61,14 +61,15 @@ def picture(options: Options) -> npt.NDArray[np.uint8]:
     steps = round(options.time / env.control_period)
     radius = env.scenario.crane.winch.drum_radius
     names = [quantity.name for quantity in env.simulation.quantities]
-    error, velocity, acceleration = (
-        names.index(name) for name in ("depth_error", "pulley_velocity_z", "pulley_acceleration_z")
+    heave, velocity, acceleration, angle = (
+        names.index(name) for name in ("pulley_heave", "pulley_velocity_z", "pulley_acceleration_z", "drum_angle")
     )
     for step in range(steps):
         state = env.simulation.state[0]
         # The pulley's velocity in the middle of the step that the command is held for.
         ahead = state[velocity] + 0.5 * env.control_period * state[acceleration]
-        command = (ahead + _CORRECTION * state[error]) / radius if 2 * step >= steps else 0.0
+        behind = state[heave] - radius * state[angle]
+        command = (ahead + _CATCH_UP * behind) / radius if 2 * step >= steps else 0.0
         env.step(np.clip([command], env.action_space.low, env.action_space.high).astype(np.float32))
     frame: npt.NDArray[np.uint8] = env.render()
     env.close()
