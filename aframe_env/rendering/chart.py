@@ -38,7 +38,7 @@ def draw_chart(canvas: Canvas, box: Box, time: float, history: FloatArray) -> No
         place = x + plot[2] * (tick - start) / SPAN
         canvas.line([(place, y), (place, y + plot[3])], palette.GRID, 1.0)
         canvas.text(f"{tick:.0f} s", (place, y + plot[3] + 12.0), size=11, colour=palette.FADED, anchor="center")
-    with canvas.within((x, y - 2.0, plot[2] + 6.0, plot[3] + 4.0)):
+    with canvas.within((x - 6.0, y - 2.0, plot[2] + 12.0, plot[3] + 4.0)):
         for column, colour, thickness in ((2, palette.HEAVE, 4.0), (1, palette.ERROR, 1.8)):
             curve = np.stack([x + plot[2] * (shown[:, 0] - start) / SPAN, middle - tall * shown[:, column]], axis=1)
             if len(curve):

@@ -52,8 +52,11 @@ def draw_magnified(canvas: Canvas, box: Box, ship_scale: float, scene: Scene, hi
         _draw_ruler(canvas, view, sea, limit)
         _draw_error(canvas, view, sea, scene, limit)
     written = canvas.text("Load", (left + 14.0, top + 17.0), size=13, bold=True)
-    magnification = f"{view.scale / ship_scale:.2g} × the ship's scale"
-    canvas.text(magnification, (left + 22.0 + written, top + 17.0), size=11, colour=palette.FADED)
+    times = view.scale / ship_scale
+    magnification = f"{times:.0f}" if times >= 10.0 else f"{times:.2g}"
+    canvas.text(
+        f"{magnification} × the ship's scale", (left + 22.0 + written, top + 17.0), size=11, colour=palette.FADED
+    )
 
 
 def _draw_range(canvas: Canvas, view: View, sea: Box, recent: FloatArray, limit: float) -> None:
