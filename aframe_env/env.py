@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import gymnasium
 import numpy as np
 import numpy.typing as npt
 
 from aframe_env import task
+from aframe_env.rendering import open_renderer
 from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.simulation import RowState, Simulation
-from aframe_env.validation import InvalidValue
+from aframe_env.validation import InvalidValue, require_choice
+
+if TYPE_CHECKING:
+    from aframe_env.rendering.renderer import Renderer
 
 _ROW = np.zeros(1, dtype=np.int64)
 
@@ -103,12 +107,16 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     - `episode_duration`: s (default 60).
     - `observation`: "state", "sensors", or a `Sensors`.
     - `max_inner_step`: s; overrides the choice of the integrator's step.
-    - `render_mode`: None; there is no picture yet.
+    - `render_mode`: None (default); "rgb_array": `render()` returns a picture, (640, 960, 3) uint8; "human": every
+      reset and step shows one in a window. Needs the extra `render`.
 
     `reset(options={"scenario": ...})` takes a `Scenario` for the one episode.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "render_fps": 10}  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 10,
+    }
 
     def __init__(
         self,
@@ -122,7 +130,7 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
         render_mode: str | None = None,
     ) -> None:
         if render_mode is not None:
-            raise InvalidValue(f"render_mode = {render_mode!r}: must be None")
+            require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
         self._simulation = Simulation(
             1,
             model=model,
@@ -135,6 +143,13 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
         self.observation_space = self._simulation.observation_space  # type: ignore[assignment]
         self.action_space = self._simulation.action_space
         self.render_mode = render_mode
+        # The ship heaves on the screen as fast as at sea.
+        self.metadata = {**self.metadata, "render_fps": 1.0 / self.control_period}  # type: ignore[misc]
+        self._renderer: Renderer | None = None if render_mode is None else open_renderer(self._simulation)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the renderer: a copy opens its own, whose history begins anew."""
+        return {**self.__dict__, "_renderer": None}
 
     @property
     def simulation(self) -> Simulation:
@@ -161,6 +176,7 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
         super().reset(seed=seed)
         drawn = self._simulation.draw(self.np_random, _scenario_option(options))
         self._simulation.reset_rows(_ROW, [drawn])
+        self._draw()
         return self._simulation.observe()[0], self._info(self._simulation.results[0].tolist())
 
     def step(
@@ -177,6 +193,7 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
             limit = float(self.action_space.high[0])  # type: ignore[attr-defined]
             raise InvalidValue(f"action = {action!r} rad/s: must be finite, in [{-limit:g}, {limit:g}]")
         simulation.advance(command)
+        self._draw()
         results = simulation.results[0].tolist()
         truncated = bool(simulation.steps[0] >= simulation.episode_steps)
         return (
@@ -195,6 +212,38 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
         """Go back to a state that ``get_state`` returned, in this environment or one of the same arguments."""
         self._simulation.write_row(0, state.row)
         self.np_random.bit_generator.state = state.generator
+        self._draw()
+
+    def render(self) -> npt.NDArray[np.uint8] | None:
+        """Return the picture of the present in render mode "rgb_array"; show it in "human"."""
+        if self.render_mode is None:
+            gymnasium.logger.warn(
+                "render() without a render mode: give one when making the environment, "
+                'as in gymnasium.make("AFrameHeave-v0", render_mode="rgb_array")'
+            )
+            return None
+        renderer = self._open_renderer()
+        if self.render_mode == "human":
+            renderer.show(self.metadata["render_fps"])
+            return None
+        return renderer.frame()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+
+    def _draw(self) -> None:
+        """Add the present to the pictures' history, and show it in render mode "human"."""
+        if self.render_mode is not None:
+            self._open_renderer().record()
+            if self.render_mode == "human":
+                self.render()
+
+    def _open_renderer(self) -> Renderer:
+        if self._renderer is None:
+            self._renderer = open_renderer(self._simulation)
+        return self._renderer
 
     @staticmethod
     def _info(results: list[float]) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -13,10 +13,14 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from aframe_env import task
-from aframe_env.env import AFrameHeaveEnv, EnvState
+from aframe_env.env import EnvState
+from aframe_env.rendering import open_renderer
 from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.simulation import Simulation
-from aframe_env.validation import InvalidValue, require_integer
+from aframe_env.validation import InvalidValue, require_choice, require_integer
+
+if TYPE_CHECKING:
+    from aframe_env.rendering.renderer import Renderer
 
 Rows = npt.NDArray[np.bool_]
 
@@ -31,6 +35,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
       reward 0), SAME_STEP (the last observation is in ``infos["final_obs"]``) or DISABLED (reset the rows that ended
       with ``reset(options={"reset_mask": ...})``).
     - ``max_episode_steps``: overrides ``episode_duration``.
+    - ``render_mode``: None or "rgb_array": ``render()`` returns one picture for each row.
 
     ``reset(options={"scenario": ...})`` takes one ``Scenario`` for all rows, or a sequence of one for each.
     """
@@ -47,13 +52,11 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         max_inner_step: float | None = None,
         max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        render_mode: None = None,
+        render_mode: str | None = None,
     ) -> None:
         require_integer("num_envs", num_envs, low=1, high=2**24)
         if render_mode is not None:
-            raise InvalidValue(
-                f"render_mode = {render_mode!r}: the vector environment does not draw; use the scalar one"
-            )
+            require_choice("render_mode", render_mode, ("rgb_array",))
         if max_episode_steps is not None:
             require_integer("max_episode_steps", max_episode_steps, low=1, high=2**31)
             episode_duration = max_episode_steps * control_period
@@ -63,7 +66,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
             modes = ", ".join(repr(mode.value) for mode in AutoresetMode)
             raise InvalidValue(f"autoreset_mode = {autoreset_mode!r}: must be one of {modes}") from None
         self.num_envs = num_envs
-        self.render_mode = None
+        self.render_mode = render_mode
         self._simulation = Simulation(
             num_envs,
             model=model,
@@ -77,11 +80,20 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         self.single_action_space = self._simulation.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self.metadata = {**AFrameHeaveEnv.metadata, "autoreset_mode": self._autoreset}
+        self.metadata = {
+            "render_modes": ["rgb_array"],
+            "render_fps": 1.0 / self._simulation.control_period,
+            "autoreset_mode": self._autoreset,
+        }
+        self._renderer: Renderer | None = None if render_mode is None else open_renderer(self._simulation)
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._seeds: list[int] = [-1] * num_envs
         self._ended = np.zeros(num_envs, dtype=np.bool_)
         self._everything = np.ones(num_envs, dtype=np.bool_)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out the renderer: a copy opens its own, whose history begins anew."""
+        return {**self.__dict__, "_renderer": None}
 
     @property
     def simulation(self) -> Simulation:
@@ -121,6 +133,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
                 self._generators[index], self._seeds[index] = seeding.np_random(seeds[index])
         self._restart(mask, scenarios)
         self._ended &= ~mask
+        self._record()
         return self._simulation.observe(), self._infos(mask)
 
     def step(
@@ -150,6 +163,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
             final = self._finals(self._ended)
             self._restart(self._ended, None)
             self._ended = np.zeros(self.num_envs, dtype=np.bool_)
+        self._record()
         return (
             simulation.observe(),
             rewards,
@@ -173,6 +187,25 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
             self._generator(i).bit_generator.state = row.generator
         steps = self._simulation.steps >= self._simulation.episode_steps
         self._ended = steps | (self._simulation.results[:, task.PARTED] > 0.0)
+        self._record()
+
+    def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
+        """Return the pictures of all rows in render mode "rgb_array"."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() without a render mode: give one when making the environment")
+            return None
+        renderer = self._open_renderer()
+        return tuple(renderer.frame(row) for row in range(self.num_envs))
+
+    def _record(self) -> None:
+        """Add the present to the pictures' history."""
+        if self.render_mode is not None:
+            self._open_renderer().record()
+
+    def _open_renderer(self) -> Renderer:
+        if self._renderer is None:
+            self._renderer = open_renderer(self._simulation)
+        return self._renderer
 
     def _generator(self, index: int) -> np.random.Generator:
         generator = self._generators[index]

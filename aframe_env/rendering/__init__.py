@@ -1,0 +1,25 @@
+"""Pictures of the environment. Reads the simulation, has no physics; the only user of pygame (extra ``render``)."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING
+
+from gymnasium.error import DependencyNotInstalled
+
+if TYPE_CHECKING:
+    from aframe_env.rendering.renderer import Renderer
+    from aframe_env.simulation import Simulation
+
+
+def open_renderer(simulation: Simulation) -> Renderer:
+    """Return a renderer of the simulation's rows; raise ``DependencyNotInstalled`` where pygame is missing."""
+    # A greeting on standard output at import has no place in the output of who imports us.
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+    try:
+        import pygame  # noqa: F401
+    except ImportError as error:
+        raise DependencyNotInstalled('pygame is not installed: pip install "aframe-heave[render]"') from error
+    from aframe_env.rendering.renderer import Renderer
+
+    return Renderer(simulation)
