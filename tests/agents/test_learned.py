@@ -91,7 +91,7 @@ def test_no_agent_and_no_json(tmp_path):
 
 def test_another_control_period_is_refused():
     policy, _ = agent()
-    with pytest.raises(InvalidValue, match="trained for 0.1 s"):
+    with pytest.raises(InvalidValue, match=r"trained for 0\.1 s"):
         policy.reset([], 0.2)
 
 
