@@ -1,0 +1,33 @@
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aframe_env.dynamics.compiling import kernel
+from aframe_env.dynamics.rope import tension
+
+
+@kernel
+def pull(elongation, rate, length, stiffness, damping):
+    return tension(elongation, rate, length, stiffness, damping)
+
+
+@given(
+    st.floats(-10.0, 10.0),
+    st.floats(-5.0, 5.0),
+    st.floats(1.0, 3000.0),
+    st.floats(1e6, 1e9),
+    st.floats(0.0, 1e6),
+)
+def test_a_rope_pulls_and_never_pushes(elongation, rate, length, stiffness, damping):
+    force = pull(elongation, rate, length, stiffness, damping)
+    linear = stiffness * elongation / length + damping * rate
+    assert force >= 0.0
+    if linear > 0:
+        assert abs(force - linear) <= 1e-9 * (abs(stiffness * elongation / length) + abs(damping * rate))
+    else:
+        assert force <= 1e-9 * (abs(stiffness * elongation / length) + abs(damping * rate))
+
+
+def test_slack_and_shortening():
+    assert pull(-1e-6, 0.0, 300.0, 2e8, 1e4) == 0.0
+    assert pull(0.1, -100.0, 300.0, 2e8, 1e4) == 0.0
+    assert pull(1.5, 0.0, 300.0, 2e8, 0.0) == 1e6
