@@ -3,17 +3,43 @@
 Nothing here calls the package's physics: the deck's motion comes as a function of time.
 """
 
+from __future__ import annotations
+
 import itertools
 import math
+from collections.abc import Callable, Iterable
 
 import numpy as np
+import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
+from aframe_env import Scenario
+from aframe_env.motion import Components
 
-def pulley(motion, point, ramp=0.0):
+FloatArray = npt.NDArray[np.float64]
+Drum = Callable[[float], tuple[float, float]]
+"""Drum angle [rad] and speed [rad/s] over time."""
+
+
+class SixDofMotion:
+    """Sum of harmonics of all six coordinates with phases of its own: 12 of them from 4 to 18 s."""
+
+    def __init__(self, seed: int, scale: float = 1.0, components: int = 12) -> None:
+        rng = np.random.default_rng(seed)
+        size = np.array([1.0, 1.0, 1.5, 0.08, 0.05, 0.03]) * scale / math.sqrt(components)
+        response = size * (rng.normal(size=(components, 6)) + 1j * rng.normal(size=(components, 6)))
+        self._components = Components(rng.uniform(0.35, 1.6, components), response)
+
+    def components(self) -> Components:
+        return self._components
+
+
+def pulley(
+    motion: Callable[[float], FloatArray], point: tuple[float, float, float], ramp: float = 0.0
+) -> Callable[[float], FloatArray]:
     """Position and velocity (6,) of a deck point over t, from motion(t) -> (2, 6), coordinates and rates."""
 
-    def at(t):
+    def at(t: float) -> FloatArray:
         q, dq = motion(t)
         if ramp and t < ramp:
             s = t / ramp
@@ -34,46 +60,68 @@ def pulley(motion, point, ramp=0.0):
     return at
 
 
-def of_components(components):
+def of_components(components: Components) -> Callable[[float], FloatArray]:
     """motion(t) -> (2, 6) of a sum of components, from its definition."""
 
-    def motion(t):
+    def motion(t: float) -> FloatArray:
         turned = components.response * np.exp(1j * components.frequency * t)[:, None]
         return np.stack([turned.real.sum(0), (1j * components.frequency[:, None] * turned).real.sum(0)])
 
     return motion
 
 
-def still(t):
+def still(t: float) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-def forces(t, y, scenario, pulley_at, drum):
-    """Rope tension and its three components on the load."""
+def behind_pulley(scenario: Scenario) -> float:
+    """|SH|, m."""
+    return math.dist(scenario.crane.pulley_position, scenario.crane.drum_position)
+
+
+def free_length(scenario: Scenario) -> float:
+    """l_0, m: so much rope, stretched by the load's weight, reaches from the drum to the load at h."""
+    reach = scenario.crane.pulley_position[2] - scenario.target_level + behind_pulley(scenario)
+    return reach / (1 + scenario.load_mass * scenario.gravity / scenario.crane.rope.axial_stiffness)
+
+
+def forces(
+    t: float, y: FloatArray, scenario: Scenario, pulley_at: Callable[[float], FloatArray], drum: Drum
+) -> tuple[float, float, float, float]:
+    """Rope tension and its three components on the load, N."""
     crane = scenario.crane
     s1, s2, s3, d1, d2, d3 = pulley_at(t).tolist()
     x1, x2, x3, v1, v2, v3 = y[:6].tolist()
     angle, speed = drum(t)
     radius = crane.winch.drum_diameter / 2
-    length = scenario.free_length + radius * angle
+    length = free_length(scenario) + radius * angle
     u1, u2, u3 = s1 - x1, s2 - x2, s3 - x3
     distance = math.sqrt(u1**2 + u2**2 + u3**2)
-    behind = math.dist(crane.pulley_position, crane.drum_position)
-    stretch = distance + behind - length
+    stretch = distance + behind_pulley(scenario) - length
     rate = (u1 * (d1 - v1) + u2 * (d2 - v2) + u3 * (d3 - v3)) / distance - radius * speed
     tension = max(0.0, crane.rope.axial_stiffness / length * stretch + scenario.rope_damping * rate)
     return tension, tension * u1 / distance, tension * u2 / distance, tension * u3 / distance
 
 
-def solve(scenario, times, pulley_at, drum=still, start=None, breaks=(), rtol=1e-10, max_step=0.1):
+def solve(
+    scenario: Scenario,
+    times: FloatArray,
+    pulley_at: Callable[[float], FloatArray],
+    drum: Drum = still,
+    start: FloatArray | None = None,
+    breaks: Iterable[float] = (),
+    max_step: float = 0.1,
+) -> FloatArray:
     """States (T, 7) at ``times``: load position, velocity, ∫(x_L3 - h)² dt. ``breaks``: times of kinks."""
     if start is None:
         tip = pulley_at(times[0])
         velocity = tip[3:] if scenario.initial == "comoving" else np.zeros(3)
-        start = np.concatenate([tip[:3] - [0.0, 0.0, scenario.rope_length], velocity])
+        start = np.concatenate(
+            [tip[:3] - [0.0, 0.0, scenario.crane.pulley_position[2] - scenario.target_level], velocity]
+        )
     y = np.append(start, 0.0)
 
-    def slope(t, y):
+    def slope(t: float, y: FloatArray) -> list[float]:
         _, f1, f2, f3 = forces(t, y, scenario, pulley_at, drum)
         error = y[2] - scenario.target_level
         mass = scenario.load_mass
@@ -81,12 +129,12 @@ def solve(scenario, times, pulley_at, drum=still, start=None, breaks=(), rtol=1e
 
     out = [y]
     # Steps end at every kink; stops that differ by rounding are one.
-    stops = np.unique(np.round(np.concatenate([breaks, times[[0, -1]]]), 9))
+    stops = np.unique(np.round(np.concatenate([list(breaks), times[[0, -1]]]), 9))
     stops = stops[(stops >= times[0] - 1e-9) & (stops <= times[-1] + 1e-9)]
     for begin, end in itertools.pairwise(stops):
         inside = times[(times > begin + 1e-8) & (times < end - 1e-8)]
         wanted = np.append(inside, end)
-        found = solve_ivp(slope, (begin, end), y, "DOP853", wanted, rtol=rtol, atol=1e-11, max_step=max_step)
+        found = solve_ivp(slope, (begin, end), y, "DOP853", wanted, rtol=1e-10, atol=1e-11, max_step=max_step)
         assert found.success
         at_end = bool(np.any(np.abs(times - end) < 1e-8))
         out.extend(found.y.T if at_end else found.y.T[:-1])
@@ -94,7 +142,9 @@ def solve(scenario, times, pulley_at, drum=still, start=None, breaks=(), rtol=1e
     return np.array(out)
 
 
-def winch(commands, period, limit, acceleration, lag=0.0):
+def winch(
+    commands: Iterable[float], period: float, limit: float, acceleration: float, lag: float = 0.0
+) -> tuple[Drum, list[float]]:
     """Drum angle and speed over time for held commands, and the times of the kinks in its speed."""
     pieces = []
     angle, speed, begin = 0.0, 0.0, 0.0
@@ -107,14 +157,14 @@ def winch(commands, period, limit, acceleration, lag=0.0):
         angle, speed = _piece(pieces[-1], begin + period)
         begin += period
 
-    def drum(t):
+    def drum(t: float) -> tuple[float, float]:
         return _piece(pieces[min(int(t / period + 1e-9), len(pieces) - 1)], t)
 
     kinks = [p[0] for p in pieces] + [p[0] + p[5] for p in pieces if 0 < p[5] < period]
     return drum, kinks
 
 
-def _piece(piece, t):
+def _piece(piece: tuple[float, ...], t: float) -> tuple[float, float]:
     begin, angle, speed, command, acceleration, ramp, lag = piece
     t -= begin
     if t <= ramp:

@@ -1,3 +1,7 @@
+"""The simplified engine against SciPy's DOP853 on the same equations, conservation of energy, and closed forms."""
+
+from __future__ import annotations
+
 import math
 from dataclasses import replace
 from importlib.resources import files
@@ -6,22 +10,25 @@ import numpy as np
 import oracle
 import pytest
 
-from aframe_env import Crane, HarmonicMotion, Rope, Scenario, Sea, SeaMotion, Winch
+from aframe_env import Crane, HarmonicMotion, Rope, Scenario, ScenarioDistribution, Sea, SeaMotion, Winch
 from aframe_env.dynamics import layout as at
 from aframe_env.engine import Engine, timing
-from aframe_env.motion import Components
 
-REFERENCE = files("aframe_env") / "data" / "reference" / "dynamic_paper_rigid.csv"
 PERIOD = 0.1
+STILL = np.zeros(600)
+WAVING = 2.0 * np.sin(0.7 * np.arange(600) * PERIOD) + np.random.default_rng(3).normal(0, 0.7, 600)
 
 
-def run(scenario, commands, period=PERIOD, **options):
-    """Load position, velocity and Ω1 (T + 1, 7) of one row."""
-    engine = Engine(1, period, **options)
+def run(
+    scenario: Scenario, commands: oracle.FloatArray, period: float = PERIOD, max_inner_step: float | None = None
+) -> oracle.FloatArray:
+    """Load position, velocity, Ω1, tension and slack flag (T + 1, 9) of one row."""
+    engine = Engine(1, period, max_inner_step=max_inner_step)
     engine.reset_row(0, scenario)
 
-    def now():
-        return np.concatenate([engine.read_many(at.LOAD_POSITION, 6)[0], engine.read(at.OMEGA1)])
+    def now() -> oracle.FloatArray:
+        rest = [engine.read(slot) for slot in (at.OMEGA1, at.TENSION, at.SLACK)]
+        return np.concatenate([engine.read_many(at.LOAD_POSITION, 6)[0], *rest])
 
     out = [now()]
     for command in commands:
@@ -30,7 +37,10 @@ def run(scenario, commands, period=PERIOD, **options):
     return np.array(out)
 
 
-def expected(scenario, commands, period=PERIOD, **options):
+def expected(
+    scenario: Scenario, commands: oracle.FloatArray, period: float = PERIOD, max_step: float = 0.1
+) -> oracle.FloatArray:
+    """Load position, velocity, Ω1, tension (T + 1, 8) by the independent integrator."""
     winch = scenario.crane.winch
     radius = winch.drum_diameter / 2
     drum, kinks = oracle.winch(
@@ -39,53 +49,58 @@ def expected(scenario, commands, period=PERIOD, **options):
     tip = oracle.pulley(
         oracle.of_components(scenario.motion.components()), scenario.crane.pulley_position, scenario.ramp
     )
-    if np.any(commands):
-        options["breaks"] = kinks
-    return oracle.solve(scenario, np.arange(len(commands) + 1) * period, tip, drum, **options)
+    times = np.arange(len(commands) + 1) * period
+    states = oracle.solve(scenario, times, tip, drum, breaks=kinks if np.any(commands) else (), max_step=max_step)
+    tensions = [oracle.forces(t, y, scenario, tip, drum)[0] for t, y in zip(times, states, strict=True)]
+    return np.column_stack([states, tensions])
 
 
-class AnyMotion:
-    """Six-degree-of-freedom sum of harmonics with phases of its own."""
-
-    def __init__(self, seed, components=12, scale=1.0):
-        rng = np.random.default_rng(seed)
-        size = np.array([1.0, 1.0, 1.5, 0.08, 0.05, 0.03]) * scale / math.sqrt(components)
-        response = size * (rng.normal(size=(components, 6)) + 1j * rng.normal(size=(components, 6)))
-        self._components = Components(rng.uniform(0.35, 1.6, components), response)
-
-    def components(self):
-        return self._components
-
-
-STILL = np.zeros(600)
-WAVING = 2.0 * np.sin(0.7 * np.arange(600) * PERIOD) + np.random.default_rng(3).normal(0, 0.7, 600)
+def sea(seed: int) -> SeaMotion:
+    return SeaMotion(sea=Sea(hs=2.5, tp=9.0, heading=2.5, seed=seed))
 
 
 @pytest.mark.parametrize(
-    ("scenario", "commands", "bound"),
+    ("scenario", "commands"),
     [
-        (Scenario.paper(), STILL, 1e-6),
-        (Scenario.paper(initial="rest"), STILL, 1e-5),
-        (Scenario.paper(initial="rest", rope_damping=2e4), STILL, 1e-6),
-        (Scenario.paper(), WAVING, 1e-5),
-        (Scenario(motion=AnyMotion(1), ramp=10.0, rope_damping=3e4), WAVING, 1e-5),
-        (Scenario(motion=SeaMotion(sea=Sea(hs=2.5, tp=9.0, heading=2.5, seed=4))), WAVING, 1e-5),
+        (Scenario.paper(), STILL),
+        (Scenario.paper(initial="rest"), STILL),
+        (Scenario.paper(initial="rest", rope_damping=2e4), STILL),
+        (Scenario.paper(), WAVING),
+        (Scenario.paper(initial="rest", rope_damping=5e3), WAVING),
+        (Scenario(motion=oracle.SixDofMotion(1), ramp=10.0, rope_damping=3e4), WAVING),
+        (Scenario(motion=sea(4)), WAVING),
+        (Scenario(motion=sea(5), ramp=10.0, rope_damping=2e4), STILL),
+        (Scenario(motion=sea(6), rope_damping=1e5, initial="rest"), WAVING),
+        (ScenarioDistribution().draw(np.random.default_rng(7)), WAVING),
         (
-            Scenario(motion=AnyMotion(4), crane=Crane(winch=Winch(lag=0.3)), load_mass=7e4, rope_damping=2e4),
+            Scenario(motion=oracle.SixDofMotion(4), crane=Crane(winch=Winch(lag=0.3)), load_mass=7e4, rope_damping=2e4),
             WAVING,
-            1e-5,
         ),
-        # Undamped, soft rope, white noise for a command: the kinks of the drum's speed add up.
-        (Scenario(motion=AnyMotion(2), load_mass=4e4, target_level=-900.0), WAVING, 2e-5),
     ],
-    ids=["paper", "rest", "damped", "paper-drum", "six-dof", "sea", "lag", "deep-light"],
+    ids=[
+        "paper",
+        "paper-rest",
+        "paper-rest-damped",
+        "paper-drum",
+        "paper-drum-rest-damped",
+        "six-dof-ramp-drum",
+        "sea-drum",
+        "sea-ramp",
+        "sea-rest-damped-drum",
+        "drawn-drum",
+        "lag-drum",
+    ],
 )
-def test_load_follows_an_independent_integrator(scenario, commands, bound):
+def test_load_follows_an_independent_integrator(scenario: Scenario, commands: oracle.FloatArray) -> None:
     got, want = run(scenario, commands), expected(scenario, commands)
-    assert np.abs(got[:, :3] - want[:, :3]).max() < bound
-    assert np.abs(got[:, 6] - want[:, 6]).max() < 1e-4 * max(1.0, want[-1, 6])
+    assert not got[:, 8].any()  # taut throughout
+    assert np.abs(got[:, :3] - want[:, :3]).max() < 1e-5
+    assert np.abs(got[:, 6] - want[:, 6]).max() < 1e-6 * max(1.0, want[-1, 6])
+    np.testing.assert_allclose(got[:, 7], want[:, 7], rtol=1e-4)
 
 
+SNATCH = np.concatenate([np.zeros(10), np.full(8, 4.0), np.full(8, -2.0), np.zeros(74)])
+"""Rope paid out at 14 m/s², faster than the load falls, goes slack, and snatches when the drum brakes."""
 FAST = Crane(winch=Winch(max_rope_acceleration=14.0))
 
 
@@ -98,166 +113,171 @@ FAST = Crane(winch=Winch(max_rope_acceleration=14.0))
         (1e5, -300.0, 0.02, 100, 3),
     ],
 )
-def test_slack_and_taut_again(mass, target, ratio, steps, events):
-    """Rope paid out at 14 m/s², faster than the load falls, goes slack, and snatches when the drum brakes."""
+def test_load_through_slack_and_taut_again(mass: float, target: float, ratio: float, steps: int, events: int) -> None:
     scenario = Scenario(motion=HarmonicMotion(), load_mass=mass, target_level=target, crane=FAST)
     scenario = replace(scenario, rope_damping=2 * ratio * mass * scenario.rope_frequency)
-    commands = np.concatenate([np.zeros(10), np.full(8, 4.0), np.full(8, -2.0), np.zeros(74)])[:steps]
-    engine = Engine(1, PERIOD)
-    engine.reset_row(0, scenario)
-    slack = []
-    for command in commands:
-        engine.step(np.array([command]))
-        slack.append(bool(engine.read(at.SLACK)[0]))
-    assert np.count_nonzero(np.diff(np.array(slack, int)) == -1) >= events
-    got, want = run(scenario, commands), expected(scenario, commands, max_step=2e-3)
+    got, want = run(scenario, SNATCH[:steps]), expected(scenario, SNATCH[:steps], max_step=5e-3)
+    assert np.abs(got[:, :3] - want[:, :3]).max() < 1e-3
+    slack = want[:, 7] == 0.0
+    assert np.count_nonzero(np.diff(slack.astype(int)) == -1) >= events
+    # Where both ends of a step are well taut or slack, the flag and the tension say which.
+    weight = mass * scenario.gravity
+    np.testing.assert_allclose(got[:, 7], want[:, 7], atol=0.02 * weight)
+    both = slack[1:] & slack[:-1]
+    assert both.any()
+    assert (got[1:][both, 7] == 0.0).all()
+    assert (got[1:][both, 8] == 1.0).all()
+    assert (got[:10, 8] == 0.0).all()
+
+
+def test_sea_slackens_the_rope_of_an_undamped_start() -> None:
+    scenario = Scenario(motion=SeaMotion(sea=Sea(hs=3.0, tp=8.0, heading=2.0, seed=3)), initial="rest")
+    got, want = run(scenario, WAVING), expected(scenario, WAVING, max_step=0.01)
+    assert got[:, 8].any()
     assert np.abs(got[:, :3] - want[:, :3]).max() < 1e-3
 
 
-def test_fourth_order():
-    scenario = Scenario(motion=AnyMotion(6), initial="rest", rope_damping=1e4)
-    want = expected(scenario, np.zeros(200))
-    errors = [
-        np.abs(run(scenario, np.zeros(200), max_inner_step=h)[:, :3] - want[:, :3]).max() for h in (0.1, 0.05, 0.025)
-    ]
-    orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert np.all((orders > 3.7) & (orders < 4.5)), (errors, orders)
-
-
-def energy(scenario, states):
-    """Kinetic, potential and elastic energy (T,), J, the ship and the drum at rest."""
-    crane = scenario.crane
-    tip = np.array(crane.pulley_position)
-    distance = np.linalg.norm(states[:, :3] - tip, axis=1)
-    stretch = distance + math.dist(crane.pulley_position, crane.drum_position) - scenario.free_length
-    stiffness = crane.rope.axial_stiffness / scenario.free_length
-    kinetic = 0.5 * scenario.load_mass * (states[:, 3:6] ** 2).sum(axis=1)
-    return (
-        kinetic
-        + scenario.load_mass * scenario.gravity * (states[:, 2] - scenario.target_level)
-        + 0.5 * stiffness * np.maximum(stretch, 0.0) ** 2
+def test_integrator_is_of_fourth_order() -> None:
+    scenario = Scenario(motion=oracle.SixDofMotion(6), initial="rest", rope_damping=1e4)
+    want = expected(scenario, STILL[:200])[:, :3]
+    errors = np.array(
+        [np.abs(run(scenario, STILL[:200], max_inner_step=h)[:, :3] - want).max() for h in (0.1, 0.05, 0.025, 0.0125)]
     )
-
-
-def swing(scenario, start, steps, **options):
-    """States (T, 7) from ``start`` (position, velocity), ship and drum still."""
-    engine = Engine(1, PERIOD, **options)
-    engine.reset_row(0, scenario)
-    row = engine.copy_row(0)
-    row[at.LOAD_POSITION : at.LOAD_POSITION + 3] = start[:3]
-    row[at.LOAD_VELOCITY : at.LOAD_VELOCITY + 3] = start[3:]
-    engine.write_row(0, row)
-    out = []
-    for _ in range(steps):
-        out.append(np.concatenate([engine.read_many(at.LOAD_POSITION, 6)[0], engine.read(at.OMEGA1)]))
-        engine.step(np.zeros(1))
-    return np.array(out)
+    ratios = errors[:-1] / errors[1:]
+    assert np.all((ratios > 14.0) & (ratios < 20.0)), (errors, ratios)
 
 
 CALM = Scenario(motion=HarmonicMotion())
 REST = np.array([*CALM.crane.pulley_position[:2], CALM.target_level, 0.0, 0.0, 0.0])
 
 
-def test_energy_is_kept_bobbing_and_swinging():
+def energy(scenario: Scenario, states: oracle.FloatArray) -> oracle.FloatArray:
+    """Kinetic, potential and elastic energy (T,), J, the ship and the drum at rest."""
+    length = oracle.free_length(scenario)
+    reach = np.linalg.norm(states[:, :3] - scenario.crane.pulley_position, axis=1) + oracle.behind_pulley(scenario)
+    stretch = np.maximum(reach - length, 0.0)
+    kinetic = 0.5 * scenario.load_mass * (states[:, 3:6] ** 2).sum(axis=1)
+    potential = scenario.load_mass * scenario.gravity * (states[:, 2] - scenario.target_level)
+    return kinetic + potential + 0.5 * scenario.crane.rope.axial_stiffness / length * stretch**2
+
+
+def swing(
+    scenario: Scenario, start: oracle.FloatArray, steps: int, max_inner_step: float | None = None
+) -> oracle.FloatArray:
+    """Load position and velocity (T, 6) from ``start``, ship and drum still."""
+    engine = Engine(1, PERIOD, max_inner_step=max_inner_step)
+    row = engine.row_vector(scenario)
+    row[at.LOAD_POSITION : at.LOAD_POSITION + 3] = start[:3]
+    row[at.LOAD_VELOCITY : at.LOAD_VELOCITY + 3] = start[3:]
+    engine.write_row(0, row)
+    out = []
+    for _ in range(steps):
+        out.append(engine.read_many(at.LOAD_POSITION, 6)[0])
+        engine.step(np.zeros(1))
+    return np.array(out)
+
+
+def test_energy_is_kept_bobbing_and_swinging() -> None:
     start = REST + np.array([10.0, -5.0, 0.3, 0.2, 0.5, 1.0])
     states = swing(CALM, start, 600)
     total = energy(CALM, states)
-    exchanged = 0.5 * CALM.load_mass * (states[:, 3:6] ** 2).sum(axis=1).max()
+    kinetic = 0.5 * CALM.load_mass * (states[:, 3:6] ** 2).sum(axis=1)
     assert np.ptp(total) < 1e-6 * total[0]
-    assert np.ptp(total) < 1e-4 * exchanged
+    assert np.ptp(kinetic) > 1e-2 * total[0]
 
 
-def test_energy_is_kept_through_bounces():
+def test_energy_is_kept_through_bounces() -> None:
     """Thrown up, the load falls back into its rope, again and again."""
     scenario = replace(CALM, load_mass=2e4, target_level=-150.0)
-    start = REST * [1, 1, 0, 0, 0, 0] + [0.0, 0.0, -150.0, 0.0, 0.0, 5.0]
+    start = np.array([*REST[:2], -150.0, 0.0, 0.0, 5.0])
     states = swing(scenario, start, 600)
     total = energy(scenario, states)
-    tip = np.array(scenario.crane.pulley_position)
-    taut = np.linalg.norm(states[:, :3] - tip, axis=1) > scenario.free_length - scenario.crane.drum_to_pulley
+    reach = np.linalg.norm(states[:, :3] - scenario.crane.pulley_position, axis=1) + oracle.behind_pulley(scenario)
+    taut = reach > oracle.free_length(scenario)
     assert np.count_nonzero(np.diff(taut)) > 20
+    # The corner in the rope's law costs RK4 its order: a few 1e-5 a bounce at the default step.
     assert np.ptp(total) < 3e-3 * total[0]
-    finer = energy(scenario, swing(scenario, start, 600, max_inner_step=0.002))
-    assert np.ptp(finer) < 2e-4 * finer[0]
+    finer = energy(scenario, swing(scenario, start, 600, max_inner_step=0.001))
+    assert np.ptp(finer) < 1e-4 * finer[0]
 
 
-def crossings(values):
+def test_damping_takes_energy_away() -> None:
+    scenario = replace(CALM, rope_damping=5e3)
+    total = energy(scenario, swing(scenario, REST + np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0]), 300))
+    assert (np.diff(total) < 1e-9 * total[0]).all()
+    assert total[-1] < total[0] - 1e4
+
+
+def crossings(values: oracle.FloatArray) -> oracle.FloatArray:
     """Times (in control steps) of upward zero crossings, interpolated by a cubic through four samples."""
     found = []
     for i in np.flatnonzero((values[1:-2] < 0) & (values[2:-1] >= 0)) + 1:
-        cubic = np.polyfit(np.arange(-1, 3), values[i - 1 : i + 3], 3)
-        roots = np.roots(cubic)
+        roots = np.roots(np.polyfit(np.arange(-1, 3), values[i - 1 : i + 3], 3))
         real = roots[np.abs(roots.imag) < 1e-9].real
         found.append(i + real[(real >= 0) & (real <= 1)][0])
     return np.array(found)
 
 
-def test_static_stretch():
-    states = swing(CALM, REST, 50)
-    assert np.abs(states[:, :3] - REST[:3]).max() < 1e-9
+def frequency(values: oracle.FloatArray) -> float:
+    """Angular frequency, rad/s, of an oscillation about zero."""
+    times = crossings(values)
+    return float(2 * math.pi * (len(times) - 1) / ((times[-1] - times[0]) * PERIOD))
+
+
+def test_static_stretch() -> None:
+    assert np.abs(swing(CALM, REST, 50)[:, :3] - REST[:3]).max() < 1e-9
     engine = Engine(1, PERIOD)
     engine.reset_row(0, CALM)
-    assert engine.read(at.TENSION)[0] == pytest.approx(1e5 * 9.81, rel=1e-12)
-    length = engine.read(at.FREE_LENGTH)[0]
-    reach = CALM.crane.drum_to_pulley + CALM.rope_length
-    assert reach - length == pytest.approx(1e5 * 9.81 * length / 2e8, rel=1e-12)
+    weight, length = 1e5 * 9.81, engine.read(at.FREE_LENGTH)[0]
+    reach = oracle.behind_pulley(CALM) + CALM.crane.pulley_position[2] + 300.0
+    assert engine.read(at.TENSION)[0] == pytest.approx(weight, rel=1e-12)
+    assert reach - length == pytest.approx(weight * length / 2e8, rel=1e-12)
 
 
 @pytest.mark.parametrize(("mass", "target"), [(1e5, -300.0), (2e4, -40.0), (1e5, -1489.0)])
-def test_small_oscillation_frequency(mass, target):
+def test_small_vertical_oscillation(mass: float, target: float) -> None:
+    """√(c/m), the rope's free length being that between drum and load, over the pulley."""
     scenario = replace(CALM, load_mass=mass, target_level=target)
-    start = REST * [1, 1, 0, 0, 0, 0] + [0.0, 0.0, target, 0.0, 0.0, 0.01]
-    height = swing(scenario, start, 600)[:, 2] - target
-    at_times = crossings(height)
-    measured = 2 * math.pi * (len(at_times) - 1) / ((at_times[-1] - at_times[0]) * PERIOD)
-    assert measured == pytest.approx(math.sqrt(2e8 / scenario.free_length / mass), rel=2e-5)
+    height = swing(scenario, np.array([*REST[:2], target, 0.0, 0.0, 0.01]), 600)[:, 2] - target
+    stiffness = 2e8 / oracle.free_length(scenario)
+    assert frequency(height) == pytest.approx(math.sqrt(stiffness / mass), rel=2e-5)
 
 
-def test_pendulum_frequency():
-    """On a stiff rope, 1 cm aside: g / l with the stretched length."""
-    scenario = replace(CALM, crane=Crane(rope=Rope(axial_stiffness=2e10)), target_level=-50.0)
-    start = REST * [1, 1, 0, 0, 0, 0] + [0.0, 0.0, -50.0, 0.01, 0.0, 0.0]
-    at_times = crossings(swing(scenario, start, 2000)[:, 0] - REST[0])
-    measured = 2 * math.pi * (len(at_times) - 1) / ((at_times[-1] - at_times[0]) * PERIOD)
-    assert measured == pytest.approx(math.sqrt(9.81 / scenario.rope_length), rel=1e-6)
+def test_small_pendulum() -> None:
+    """√(g/|LS|) with the stretched length, on the elastic rope as on a stiff one."""
+    for stiffness in (2e8, 2e10):
+        scenario = replace(CALM, crane=Crane(rope=Rope(axial_stiffness=stiffness)), target_level=-50.0)
+        start = np.array([*REST[:2], -50.0, 0.01, 0.0, 0.0])
+        aside = swing(scenario, start, 2000)[:, 0] - REST[0]
+        length = scenario.crane.pulley_position[2] + 50.0
+        assert frequency(aside) == pytest.approx(math.sqrt(9.81 / length), rel=1e-6)
 
 
-def test_short_rope_and_light_load():
-    """The stiffest corner of the default distribution, and beyond: the step follows the rope's frequency."""
-    for length, mass in ((50.0, 20e3), (25.0, 5e3)):
-        scenario = Scenario(
-            motion=AnyMotion(8, scale=0.5),
-            load_mass=mass,
-            target_level=Crane().pulley_position[2] - length,
-            rope_damping=1e3,
-        )
-        times = timing(scenario, PERIOD)
-        assert times.inner_step * scenario.rope_frequency <= 0.1 + 1e-12
-        got, want = run(scenario, STILL[:200]), expected(scenario, STILL[:200])
-        assert np.abs(got[:, :3] - want[:, :3]).max() < 1e-5
-
-
-@pytest.mark.parametrize(
-    ("period", "segments", "segment"), [(0.1, 1, 0.1), (0.2, 1, 0.2), (0.5, 3, 0.5 / 3), (2.0, 10, 0.2)]
-)
-def test_long_control_periods_are_divided(period, segments, segment):
-    times = timing(CALM, period)
-    assert (times.segments, times.segment) == (segments, pytest.approx(segment))
-    assert times.inner_step <= 0.02 + 1e-12
-    commands = np.resize([1.0, -1.5, 0.5], round(30 / period))
-    scenario = Scenario(motion=AnyMotion(9))
-    got, want = run(scenario, commands, period), expected(scenario, commands, period)
+@pytest.mark.parametrize(("length", "mass"), [(50.0, 20e3), (25.0, 5e3), (9.0, 100.0), (9.0, 1.0)])
+def test_step_follows_the_ropes_frequency(length: float, mass: float) -> None:
+    """The default distribution's stiffest corner, and shorter and lighter: down to 1 kg on the shortest rope."""
+    scenario = Scenario(
+        motion=oracle.SixDofMotion(8, scale=0.5), load_mass=mass, target_level=Crane().pulley_position[2] - length
+    )
+    scenario = replace(scenario, rope_damping=0.02 * 2 * mass * scenario.rope_frequency)
+    steps = 100 if mass > 1e3 else 10
+    got, want = run(scenario, STILL[:steps]), expected(scenario, STILL[:steps], max_step=0.02)
     assert np.abs(got[:, :3] - want[:, :3]).max() < 1e-5
 
 
-def test_tension_of_the_reference():
+def test_control_period_does_not_change_the_physics() -> None:
+    scenario = Scenario(motion=oracle.SixDofMotion(9))
+    for period, segments in ((0.02, 1), (0.2, 1), (0.5, 3), (2.0, 10)):
+        assert timing(scenario, period).segments == segments
+        commands = np.resize([1.0, -1.5, 0.5], round(30 / period))
+        got, want = run(scenario, commands, period), expected(scenario, commands, period)
+        assert np.abs(got[:, :3] - want[:, :3]).max() < 1e-5
+
+
+def test_tension_of_the_reference() -> None:
     """Position and tension of an independent program's run of the paper's case."""
-    table = np.genfromtxt(str(REFERENCE), delimiter=",", names=True)
-    engine = Engine(1, PERIOD)
-    engine.reset_row(0, Scenario.paper())
-    for k in range(601):
-        line = table[2 * k]
-        got = engine.read_many(at.LOAD_POSITION, 3)[0]
-        assert np.abs(got - [line["xL1_m"], line["xL2_m"], line["xL3_m"]]).max() < 1e-5
-        assert engine.read(at.TENSION)[0] == pytest.approx(line["T_rope_N"], rel=1e-5)
-        engine.step(np.zeros(1))
+    path = files("aframe_env") / "data" / "reference" / "dynamic_paper_rigid.csv"
+    table = np.genfromtxt(str(path), delimiter=",", names=True)[::2]
+    got = run(Scenario.paper(), STILL)
+    assert np.abs(got[:, :3] - np.stack([table["xL1_m"], table["xL2_m"], table["xL3_m"]], axis=1)).max() < 1e-5
+    np.testing.assert_allclose(got[:, 7], table["T_rope_N"], rtol=1e-5)
