@@ -70,7 +70,7 @@ def sea(seed: int) -> SeaMotion:
         (Scenario(motion=oracle.SixDofMotion(1), ramp=10.0, rope_damping=3e4), WAVING),
         (Scenario(motion=sea(4)), WAVING),
         (Scenario(motion=sea(5), ramp=10.0, rope_damping=2e4), STILL),
-        (Scenario(motion=sea(6), rope_damping=1e5, initial="rest"), WAVING),
+        (Scenario(motion=sea(6), rope_damping=2.5e4, initial="rest"), WAVING),
         (ScenarioDistribution().draw(np.random.default_rng(7)), WAVING),
         (
             Scenario(motion=oracle.SixDofMotion(4), crane=Crane(winch=Winch(lag=0.3)), load_mass=7e4, rope_damping=2e4),
