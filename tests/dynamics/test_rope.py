@@ -1,4 +1,8 @@
-from hypothesis import given
+"""The rope's law."""
+
+from __future__ import annotations
+
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aframe_env.dynamics.compiling import kernel
@@ -6,10 +10,11 @@ from aframe_env.dynamics.rope import tension
 
 
 @kernel
-def pull(elongation, rate, length, stiffness, damping):
+def pull(elongation: float, rate: float, length: float, stiffness: float, damping: float) -> float:
     return tension(elongation, rate, length, stiffness, damping)
 
 
+@settings(max_examples=100, deadline=None)
 @given(
     st.floats(-10.0, 10.0),
     st.floats(-5.0, 5.0),
@@ -17,7 +22,9 @@ def pull(elongation, rate, length, stiffness, damping):
     st.floats(1e6, 1e9),
     st.floats(0.0, 1e6),
 )
-def test_a_rope_pulls_and_never_pushes(elongation, rate, length, stiffness, damping):
+def test_a_rope_pulls_and_never_pushes(
+    elongation: float, rate: float, length: float, stiffness: float, damping: float
+) -> None:
     force = pull(elongation, rate, length, stiffness, damping)
     linear = stiffness * elongation / length + damping * rate
     assert force >= 0.0
@@ -27,7 +34,7 @@ def test_a_rope_pulls_and_never_pushes(elongation, rate, length, stiffness, damp
         assert force <= 1e-9 * (abs(stiffness * elongation / length) + abs(damping * rate))
 
 
-def test_slack_and_shortening():
+def test_slack_and_shortening() -> None:
     assert pull(-1e-6, 0.0, 300.0, 2e8, 1e4) == 0.0
     assert pull(0.1, -100.0, 300.0, 2e8, 1e4) == 0.0
     assert pull(1.5, 0.0, 300.0, 2e8, 0.0) == 1e6

@@ -1,6 +1,12 @@
+"""The winch against a fine integration of its differential equation, and closed forms."""
+
+from __future__ import annotations
+
 import math
+from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,7 +19,7 @@ PERIOD = 0.1
 FINE = 4000
 
 
-def brute(winch, free_length, commands):
+def brute(winch: Winch, free_length: float, commands: Sequence[float]) -> npt.NDArray[np.float64]:
     """Angle and speed at the end of each control step, by fine integration of the speed's differential
     equation.
 
@@ -46,8 +52,9 @@ def brute(winch, free_length, commands):
     return np.array(out)
 
 
-def engine_run(winch, commands, target=-300.0):
-    scenario = Scenario(crane=Crane(winch=winch), motion=HarmonicMotion(), target_level=target)
+def engine_run(winch: Winch, commands: Sequence[float]) -> tuple[float, npt.NDArray[np.float64]]:
+    """Free rope length, and the drum's angle and speed after each control step."""
+    scenario = Scenario(crane=Crane(winch=winch), motion=HarmonicMotion())
     engine = Engine(1, PERIOD)
     engine.reset_row(0, scenario)
     out = []
@@ -64,7 +71,7 @@ def engine_run(winch, commands, target=-300.0):
     acceleration=st.sampled_from([0.5, 2.0, 20.0]),
     speed=st.sampled_from([0.5, 3.0]),
 )
-def test_winch_follows_its_command(commands, lag, acceleration, speed):
+def test_winch_follows_its_command(commands: list[float], lag: float, acceleration: float, speed: float) -> None:
     winch = Winch(lag=lag, max_rope_acceleration=acceleration, max_rope_speed=speed)
     free_length, got = engine_run(winch, commands)
     want = brute(winch, free_length, commands)
@@ -80,7 +87,7 @@ def test_winch_follows_its_command(commands, lag, acceleration, speed):
     lag=st.sampled_from([0.0, 0.3]),
     room=st.floats(0.01, 0.3),
 )
-def test_limit_switches_hold_the_drum(commands, lag, room):
+def test_limit_switches_hold_the_drum(commands: list[float], lag: float, room: float) -> None:
     length = Scenario.paper().free_length
     winch = Winch(lag=lag, min_rope_length=length - room, max_rope_length=length + room)
     free_length, got = engine_run(winch, commands)
@@ -89,7 +96,7 @@ def test_limit_switches_hold_the_drum(commands, lag, room):
     assert np.abs(got[:, 0]).max() <= room / 0.75 + 1e-12
 
 
-def test_speed_at_the_limit_switch_is_zero():
+def test_speed_at_the_limit_switch_is_zero() -> None:
     length = Scenario.paper().free_length
     winch = Winch(max_rope_length=length + 0.5)
     _, got = engine_run(winch, [4.0] * 20 + [-1.0] * 5)
@@ -97,7 +104,7 @@ def test_speed_at_the_limit_switch_is_zero():
     assert got[24, 1] == pytest.approx(-1.0, abs=1e-12)
 
 
-def test_lag_is_first_order():
+def test_lag_is_first_order() -> None:
     """Far from the limits a step in the command is answered by 1 - exp(-t / lag)."""
     winch = Winch(lag=0.5, max_rope_acceleration=1e3)
     _, got = engine_run(winch, [1.0] * 20)
@@ -107,7 +114,7 @@ def test_lag_is_first_order():
     np.testing.assert_allclose(got[:, 0], t - 0.5 * (1 - np.exp(-t / 0.5)), rtol=1e-11)
 
 
-def test_drum_without_lag_ramps():
+def test_drum_without_lag_ramps() -> None:
     _, got = engine_run(Winch(), [4.0] * 20)
     a, t = 2.0 / 0.75, PERIOD * np.arange(1, 21)
     ramp = 4.0 / a
