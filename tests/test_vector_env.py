@@ -109,6 +109,9 @@ def test_ended_rows_must_be_reset_when_nothing_resets_them() -> None:
         env.step(still)
     env.reset(options={"reset_mask": truncated})
     assert env.step(still)[3].tolist() == [True, False]
+    env.reset(options={"reset_mask": np.array([False, True])})
+    with pytest.raises(gymnasium.error.ResetNeeded, match=r"rows \[0\] have ended"):
+        env.step(still)
 
 
 def test_scenarios_for_all_rows_and_for_each() -> None:

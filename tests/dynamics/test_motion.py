@@ -2,37 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 from aframe_env import Harmonic, HarmonicMotion, Scenario, Sea, SeaMotion
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.compiling import kernel
 from aframe_env.dynamics.motion import on_quintic, quintic, smooth_ramp
 from aframe_env.engine import Engine
-
-
-@kernel
-def ramp(time: float, rate: float, offset: float) -> tuple[float, float, float]:
-    return smooth_ramp(time, rate, offset)
 
 
 def test_ramp_is_the_quintic_smoothstep_with_its_derivatives() -> None:
     duration = 8.0
     step = np.polynomial.Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
     times = np.linspace(0.0, duration, 401)
-    got = np.array([ramp(t, 1 / duration, 0.0) for t in times])
+    got = np.array([smooth_ramp(t, 1 / duration, 0.0) for t in times])
     s = times / duration
     want = np.stack([step.deriv(k)(s) / duration**k if k else step(s) for k in range(3)], axis=1)
     np.testing.assert_allclose(got, want, rtol=0, atol=1e-14)
-    assert [ramp(t, 1 / duration, 0.0) for t in (8.0, 8.1, 1e5)] == [(1.0, 0.0, 0.0)] * 3
+    assert [smooth_ramp(t, 1 / duration, 0.0) for t in (8.0, 8.1, 1e5)] == [(1.0, 0.0, 0.0)] * 3
 
 
 def test_no_ramp() -> None:
-    assert [ramp(t, 0.0, 1.0) for t in (0.0, 3.0, 1e4)] == [(1.0, 0.0, 0.0)] * 3
+    assert [smooth_ramp(t, 0.0, 1.0) for t in (0.0, 3.0, 1e4)] == [(1.0, 0.0, 0.0)] * 3
 
 
 def test_ramped_start_is_at_rest() -> None:
@@ -40,11 +32,6 @@ def test_ramped_start_is_at_rest() -> None:
     engine.reset_row(0, Scenario(motion=SeaMotion(sea=Sea(hs=4.0, tp=8.0, seed=1)), ramp=10.0))
     assert engine.read_many(at.MOTION, 18)[0] == pytest.approx(np.zeros(18), abs=1e-15)
     assert engine.read_many(at.LOAD_VELOCITY, 3)[0] == pytest.approx(np.zeros(3), abs=1e-15)
-
-
-@kernel
-def interpolate(values: Any, duration: float, t: float) -> tuple[float, float]:
-    return on_quintic(*quintic(*values, duration), t)
 
 
 @pytest.mark.parametrize(("frequency", "duration"), [(0.5, 0.1), (2.5, 0.1), (2.5, 0.2), (4.0, 0.2)])
@@ -58,7 +45,7 @@ def test_quintic_stays_within_its_stated_error(frequency: float, duration: float
 
         ends = (*map(float, exact(0.0)), *map(float, exact(duration)))
         for t in np.linspace(0, duration, 41):
-            position, velocity = interpolate(ends, duration, float(t))
+            position, velocity = on_quintic(*quintic(*ends, duration), float(t))
             worst = max(worst, abs(position - exact(t)[0]))
             assert abs(velocity - exact(t)[1]) < 8 * (frequency * duration) ** 6 / 46080 / duration + 1e-14
     bound = (frequency * duration) ** 6 / 46080

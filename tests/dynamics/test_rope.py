@@ -5,13 +5,7 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aframe_env.dynamics.compiling import kernel
 from aframe_env.dynamics.rope import tension
-
-
-@kernel
-def pull(elongation: float, rate: float, length: float, stiffness: float, damping: float) -> float:
-    return tension(elongation, rate, length, stiffness, damping)
 
 
 @settings(max_examples=100, deadline=None)
@@ -25,7 +19,7 @@ def pull(elongation: float, rate: float, length: float, stiffness: float, dampin
 def test_a_rope_pulls_and_never_pushes(
     elongation: float, rate: float, length: float, stiffness: float, damping: float
 ) -> None:
-    force = pull(elongation, rate, length, stiffness, damping)
+    force = tension(elongation, rate, length, stiffness, damping)
     linear = stiffness * elongation / length + damping * rate
     assert force >= 0.0
     if linear > 0:
@@ -35,6 +29,6 @@ def test_a_rope_pulls_and_never_pushes(
 
 
 def test_slack_and_shortening() -> None:
-    assert pull(-1e-6, 0.0, 300.0, 2e8, 1e4) == 0.0
-    assert pull(0.1, -100.0, 300.0, 2e8, 1e4) == 0.0
-    assert pull(1.5, 0.0, 300.0, 2e8, 0.0) == 1e6
+    assert tension(-1e-6, 0.0, 300.0, 2e8, 1e4) == 0.0
+    assert tension(0.1, -100.0, 300.0, 2e8, 1e4) == 0.0
+    assert tension(1.5, 0.0, 300.0, 2e8, 0.0) == 1e6

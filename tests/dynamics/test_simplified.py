@@ -257,12 +257,17 @@ def test_small_pendulum() -> None:
 def test_step_follows_the_ropes_frequency(length: float, mass: float) -> None:
     """The default distribution's stiffest corner, and shorter and lighter: down to 1 kg on the shortest rope."""
     scenario = Scenario(
-        motion=oracle.SixDofMotion(8, scale=0.5), load_mass=mass, target_level=Crane().pulley_position[2] - length
+        motion=oracle.SixDofMotion(8, scale=0.25),
+        load_mass=mass,
+        target_level=Crane().pulley_position[2] - length,
+        initial="rest",
     )
-    scenario = replace(scenario, rope_damping=0.02 * 2 * mass * scenario.rope_frequency)
-    steps = 100 if mass > 1e3 else 10
+    scenario = replace(scenario, rope_damping=0.01 * 2 * mass * scenario.rope_frequency)
+    steps = 300 if mass > 1e3 else 10
     got, want = run(scenario, STILL[:steps]), expected(scenario, STILL[:steps], max_step=0.02)
-    assert np.abs(got[:, :3] - want[:, :3]).max() < 1e-5
+    slack = got[:, 8].any()
+    assert slack == (mass < 20e3)
+    assert np.abs(got[:, :3] - want[:, :3]).max() < (1e-3 if slack else 1e-5)
 
 
 def test_control_period_does_not_change_the_physics() -> None:
