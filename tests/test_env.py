@@ -11,6 +11,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
 from aframe_env import InvalidValue, Scenario, ScenarioDistribution, Sea
 
@@ -36,6 +37,16 @@ def test_gymnasium_check(observation: str) -> None:
         # Actions are rad/s by design, as Pendulum-v1's are N m.
         warnings.filterwarnings("ignore", message=".*symmetric and normalized.*")
         check_env(env, skip_render_check=True)
+
+
+@pytest.mark.parametrize("observation", ["state", "sensors"])
+def test_stable_baselines3_check(observation: str) -> None:
+    env = gymnasium.make("AFrameHeave-v0", observation=observation)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # Actions are rad/s by design; what trains rescales them.
+        warnings.filterwarnings("ignore", message="We recommend you to use a symmetric and normalized Box action space")
+        sb3_check_env(env, warn=True, skip_render_check=True)
 
 
 def test_return_is_minus_omega1() -> None:

@@ -76,15 +76,21 @@ def sum_components(row: Block, components: int, lanes: int) -> None:
 
 @scalar
 def read_record(row: Block, records: npt.NDArray[np.float64], lanes: int) -> None:
-    """Deck coordinates of rows that follow a recorded motion: the table's line at the row's time."""
+    """Deck coordinates of rows that follow a recorded motion: the table's line at the row's time.
+
+    After the last line the deck stands still where that line has it.
+    """
     for j in range(lanes):
         first = int(row[at.RECORD * lanes + j])
         if first >= 0:
             line = int(row[at.STEP * lanes + j])
             last = int(row[at.RECORD_LENGTH * lanes + j]) - 1
+            moving = 1.0 if line <= last else 0.0
             line = line if line < last else last
-            for i in range(18):
+            for i in range(6):
                 row[(at.MOTION + i) * lanes + j] = records[first + line, i]
+            for i in range(6, 18):
+                row[(at.MOTION + i) * lanes + j] = moving * records[first + line, i]
 
 
 @scalar

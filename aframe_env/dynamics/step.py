@@ -170,10 +170,12 @@ def inner_step(row: Array, index: int, lanes: int) -> None:
         row[(at.TIP + 3) * lanes + j] = e4 if active else t4
         row[(at.TIP + 4) * lanes + j] = e5 if active else t5
         row[(at.TIP + 5) * lanes + j] = e6 if active else t6
+        # A lane that stands still has met its pulley and drum beyond the segment: what it felt there is no tension.
+        row[at.SLACK * lanes + j] = 1.0 if active and peak <= 0.0 else row[at.SLACK * lanes + j]
+        peak = peak if active else 0.0
         row[at.PEAK_TENSION * lanes + j] = (
             peak if peak > row[at.PEAK_TENSION * lanes + j] else row[at.PEAK_TENSION * lanes + j]
         )
-        row[at.SLACK * lanes + j] = 1.0 if peak <= 0.0 else row[at.SLACK * lanes + j]
         row[at.PARTED * lanes + j] = 1.0 if peak > row[at.BREAKING_LOAD * lanes + j] else parted
 
 
