@@ -161,7 +161,7 @@ def test_scenario_option_is_the_episode() -> None:
         (lambda: AFrameHeaveEnv(max_inner_step=0.0), r"max_inner_step = 0.0 s: must be in \[1e-06, 0.2\] s"),
         (lambda: AFrameHeaveEnv(episode_duration=0.01), r"episode_duration = 0.01 s: must be in \[0.1, 1e\+06\] s"),
         (lambda: AFrameHeaveEnv(scenario="paper"), "scenario = 'paper': must be a Scenario or a ScenarioDistribution"),
-        (lambda: AFrameHeaveEnv(render_mode="human"), "render_mode = 'human'"),
+        (lambda: AFrameHeaveEnv(render_mode="ansi"), "render_mode = 'ansi'"),
         (lambda: AFrameHeaveEnv().reset(options={"sea": 1}), "options: unknown key 'sea': must be 'scenario'"),
         (lambda: AFrameHeaveEnv().reset(options={"scenario": 1}), r"options\['scenario'\] = 1: must be a Scenario"),
     ],

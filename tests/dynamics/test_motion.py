@@ -72,6 +72,10 @@ class Record:
     def __init__(self, motion: SeaMotion, duration: float) -> None:
         self._motion, self._duration = motion, duration
 
+    @property
+    def duration(self) -> float:
+        return self._duration
+
     def table(self, period: float) -> npt.NDArray[np.float64]:
         times = np.arange(0.0, self._duration + period / 2, period)
         return self._motion.components().at(times).transpose(1, 0, 2).reshape(len(times), 18)
