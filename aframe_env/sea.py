@@ -9,14 +9,15 @@ same waves with their phases.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
-from typing import Literal
+from functools import cache, lru_cache
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.dynamics.compiling import kernel
+from aframe_env.dynamics.compiling import kernel, source_digest
 from aframe_env.motion import ComplexArray, Components, FloatArray
 from aframe_env.random import uniform
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
@@ -84,7 +85,7 @@ class Sea:
 
     def waves(self) -> Waves:
         """Return the realisation: one regular wave for each component."""
-        frequency, direction, phase = _realise(
+        frequency, direction, phase = _realise_kernel()(
             self.seed,
             self.components,
             2.0 * math.pi / self.tp,
@@ -196,29 +197,36 @@ def _quantile(table: FloatArray, probability: float) -> float:
     return value
 
 
-@kernel
-def _realise(
-    seed: int,
-    components: int,
-    peak: float,
-    frequency_table: FloatArray,
-    gamma_place: float,
-    heading: float,
-    direction_table: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    frequency = np.empty(components)
-    direction = np.empty(components)
-    phase = np.empty(components)
-    low = min(int(gamma_place), frequency_table.shape[0] - 2)
-    weight = gamma_place - low
-    for k in range(components):
-        probability = (k + uniform(seed, 3 * k)) / components
-        x = (1.0 - weight) * _quantile(frequency_table[low], probability)
-        x += weight * _quantile(frequency_table[low + 1], probability)
-        frequency[k] = peak * x
-        phase[k] = 2.0 * math.pi * uniform(seed, 3 * k + 1)
-        direction[k] = heading + _quantile(direction_table, uniform(seed, 3 * k + 2))
-    return frequency, direction, phase
+@cache
+def _realise_kernel() -> Callable[..., tuple[FloatArray, FloatArray, FloatArray]]:
+    source: Any = source_digest()
+
+    @kernel
+    def realise(
+        seed: int,
+        components: int,
+        peak: float,
+        frequency_table: FloatArray,
+        gamma_place: float,
+        heading: float,
+        direction_table: FloatArray,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        source  # noqa: B018
+        frequency = np.empty(components)
+        direction = np.empty(components)
+        phase = np.empty(components)
+        low = min(int(gamma_place), frequency_table.shape[0] - 2)
+        weight = gamma_place - low
+        for k in range(components):
+            probability = (k + uniform(seed, 3 * k)) / components
+            x = (1.0 - weight) * _quantile(frequency_table[low], probability)
+            x += weight * _quantile(frequency_table[low + 1], probability)
+            frequency[k] = peak * x
+            phase[k] = 2.0 * math.pi * uniform(seed, 3 * k + 1)
+            direction[k] = heading + _quantile(direction_table, uniform(seed, 3 * k + 2))
+        return frequency, direction, phase
+
+    return realise
 
 
 @kernel

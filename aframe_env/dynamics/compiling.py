@@ -34,12 +34,13 @@ def parallel_kernel(function: F) -> F:
 
 @cache
 def source_digest() -> str:
-    """Digest of the physics' sources.
+    """Digest of the sources of whatever compiled code calls: the physics, and the random numbers.
 
     numba invalidates a cached kernel when the kernel's own file changes, not when a function that it calls does.
     A kernel that closes over this digest is compiled anew after any change.
     """
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
+    physics = Path(__file__).parent
+    for path in sorted([*physics.rglob("*.py"), physics.parent / "random.py"]):
         digest.update(path.read_bytes())
     return digest.hexdigest()
