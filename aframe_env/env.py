@@ -91,7 +91,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     ## Episode end
     - Truncation: after `episode_duration`.
     - Termination: the rope's tension passed its breaking load and the load is lost. It then falls freely, and the
-      last reward includes what that costs until the end of the episode: to lose the load never pays.
+      last reward includes what that costs until the end of the episode, and for at least 10 s: to lose the load
+      never pays.
 
     ## Information
     `time` [s], `load_position` (3,) [m], `rope_tension` [N], `slack` (the rope was slack within the last step),

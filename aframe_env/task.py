@@ -78,6 +78,10 @@ def box(quantities: tuple[Quantity, ...]) -> spaces.Box:
     )
 
 
+LEAST_FALL: Final = 10.0
+"""Shortest fall of a lost load that is charged for, s: 13 000 m² s or more, whatever the load was doing."""
+
+
 @scalar
 def free_fall_cost(error: float, velocity: float, gravity: float, duration: float) -> float:
     """∫ (e + v τ - g τ²/2)² dτ over ``duration``, m² s: the cost of a load that falls freely."""
@@ -108,14 +112,15 @@ def free_fall_peak(error: float, velocity: float, gravity: float, duration: floa
 
 @scalar
 def charge_parted(row: Any, episode_duration: float, lanes: int, j: int) -> None:
-    """Charge a row whose rope has parted with the free fall of its load until the episode's end, once.
+    """Charge a row whose rope has parted with the free fall of its load, once.
 
-    So the return stays -Ω1 of the whole episode, and to lose the load is never the cheaper way out.
+    The fall lasts until the episode's end and at least LEAST_FALL: the return is -Ω1 of all that time, and to lose
+    the load is never the cheaper way out, not even at the end.
     """
     if row[at.PARTED * lanes + j] == 1.0 and row[at.CHARGED * lanes + j] == 0.0:
         row[at.CHARGED * lanes + j] = 1.0
         left = episode_duration - row[at.TIME * lanes + j]
-        left = left if left > 0.0 else 0.0
+        left = left if left > LEAST_FALL else LEAST_FALL
         error = row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j]
         velocity = row[(at.LOAD_VELOCITY + 2) * lanes + j]
         gravity = row[at.GRAVITY * lanes + j]

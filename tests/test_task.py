@@ -13,7 +13,7 @@ from aframe_env import Crane, HarmonicMotion, Rope, Scenario, ScenarioDistributi
 from aframe_env.dynamics import layout as at
 from aframe_env.engine import Engine
 from aframe_env.env import AFrameHeaveEnv
-from aframe_env.task import free_fall_cost, free_fall_peak
+from aframe_env.task import LEAST_FALL, free_fall_cost, free_fall_peak
 
 GRAVITY = 9.81
 UNBREAKABLE = 1e12
@@ -66,7 +66,7 @@ def test_parting_ends_the_episode_at_the_cost_of_the_fall(seed: int) -> None:
     assert total == pytest.approx(-info["omega1"], rel=1e-12)
     error = info["load_position"][2] - env.scenario.target_level
     velocity = env.simulation.engine.read(at.LOAD_VELOCITY + 2)[0]
-    left = 20.0 - info["time"]
+    left = max(20.0 - info["time"], LEAST_FALL)
     path = fall(error, velocity)
     cost = (path**2).integ()(left)
     # What is left over is the cost within the step in which the rope parted.
@@ -89,6 +89,8 @@ def test_parted_load_falls_freely_in_the_engine(seed: int) -> None:
         if not terminated:
             _, _, terminated, _, info = env.step(action)
         engine.step(action.astype(float))
+    while engine.read(at.TIME)[0] < info["time"] + LEAST_FALL - 1e-9:
+        engine.step(np.zeros(1))
     assert engine.read(at.PARTED)[0] == 1.0
     assert engine.read(at.OMEGA1)[0] == pytest.approx(info["omega1"], rel=1e-6)
     assert engine.read(at.OMEGA2)[0] == pytest.approx(info["omega2"], rel=1e-9)
@@ -109,6 +111,24 @@ def test_to_lose_the_load_costs_more_than_to_go_on(seed: int) -> None:
         returns.append(total)
         assert terminated == (breaking_load != UNBREAKABLE)
     assert returns[0] < returns[1]
+
+
+def test_to_lose_the_load_at_the_very_end_does_not_pay() -> None:
+    """Here the load is above its level, so that a short fall would bring it nearer."""
+    weak = replace(scenario(0, 1.03e6), target_level=-100.0, rope_damping=5e5)
+    for crane in (weak.crane, Crane(rope=Rope(breaking_load=UNBREAKABLE))):
+        env = AFrameHeaveEnv(scenario=replace(weak, crane=crane, motion=HarmonicMotion()), episode_duration=5.0)
+        env.reset(seed=0)
+        total, terminated = 0.0, False
+        for step in range(50):
+            # Haul in gently, and jerk in the last step.
+            _, reward, terminated, _, info = env.step(np.array([-0.05 if step < 49 else -4.0], dtype=np.float32))
+            total += float(reward)
+        assert info["load_position"][2] > -100.0
+        if crane is weak.crane:
+            assert terminated
+            lost = total
+    assert lost < total
 
 
 def test_rope_parts_at_its_breaking_load() -> None:
