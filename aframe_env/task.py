@@ -107,7 +107,7 @@ def free_fall_peak(error: float, velocity: float, gravity: float, duration: floa
     rise = 0.0 if rise < 0.0 else (duration if rise > duration else rise)
     top = abs(error + velocity * rise - 0.5 * gravity * rise * rise)
     end = abs(error + velocity * duration - 0.5 * gravity * duration * duration)
-    return top if top > end else end
+    return max(abs(error), top, end)
 
 
 @scalar
