@@ -28,6 +28,7 @@ import numpy as np
 import scipy
 
 from aframe_env.validation import InvalidValue
+from train.output import write_json, write_text
 from train.verification import frame_checks, run_checks
 from train.verification.cases import (
     FORMAT,
@@ -35,8 +36,7 @@ from train.verification.cases import (
     read_toml,
     release_case,
     static_case,
-    write_json,
-    write_text,
+    without_nan,
 )
 from train.verification.pictures import draw_all
 from train.verification.report import Check, markdown
@@ -120,7 +120,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if path is not None:
                 if given.out is None:
                     parser.error(f"--{name.replace('_', '-')} needs --out FILE.json")
-                write_json(given.out, solve(read_toml(path)))
+                write_json(given.out, without_nan(solve(read_toml(path))))
                 return 0
     except InvalidValue as error:
         print(f"error: {error}", file=sys.stderr)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 
 import matplotlib as mpl
@@ -15,6 +13,7 @@ from aframe_env.crane import Crane
 from aframe_env.dynamics.rfem.beam import Array
 from aframe_env.dynamics.rfem.model import FrameModel
 from aframe_env.dynamics.rfem.reference import natural_frequencies, static_cases, time_series
+from train.output import write_atomically
 from train.verification.cases import dynamic_columns
 from train.verification.frame_checks import CASES, model
 from train.verification.run_checks import paper_run, ramp_release
@@ -24,17 +23,8 @@ HERE, REFERENCE = "#1f77b4", "#d62728"
 
 def save(figure: Figure, path: Path) -> None:
     """Write a PNG under a temporary name, then rename it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".part")
-    os.close(handle)
-    try:
-        # No software version in the file: the same figures give the same bytes.
-        figure.savefig(name, format="png", dpi=110, metadata={"Software": None})
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+    # No software version in the file: the same figures give the same bytes.
+    write_atomically(path, lambda to: figure.savefig(to, format="png", dpi=110, metadata={"Software": None}))
 
 
 def _nodes(frame: FrameModel) -> tuple[Array, list[tuple[int, Array]]]:
