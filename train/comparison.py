@@ -109,7 +109,7 @@ def _share(interval: Interval) -> str:
 
 
 def _metres(interval: Interval) -> str:
-    return f"{interval.median:.3f} [{interval.low:.3f}, {interval.high:.3f}]"
+    return f"{interval.median:.3g} [{interval.low:.3g}, {interval.high:.3g}]"
 
 
 HEADINGS = (
