@@ -39,7 +39,6 @@ def comparison_figure(path: Path, entries: Sequence[Entry], still: Episodes) -> 
     profile.set_ylabel("share of scenarios with at least this reduction")
     profile.set_ylim(0.0, 1.02)
     profile.grid(alpha=0.3)
-    profile.legend(loc="center", bbox_to_anchor=(0.43, 0.4), fontsize=8)
     profile.set_title("Held-out scenarios (dashed: knows the future)", fontsize=11)
     example = int(np.argsort(still.rms)[len(still.rms) // 2])
     shown = min(len(e.episodes.rms) for e in entries)
@@ -58,4 +57,5 @@ def comparison_figure(path: Path, entries: Sequence[Entry], still: Episodes) -> 
     history.set_title(f"Scenario {example}: depth error, and the same magnified", fontsize=11)
     magnified.set_ylim(-0.06 * limit, 0.06 * limit)
     magnified.set_xlabel("time, s")
+    figure.legend(*history.get_legend_handles_labels(), loc="outside lower center", ncols=len(entries), fontsize=9)
     write_atomically(path, lambda temporary: figure.savefig(temporary, dpi=130))
