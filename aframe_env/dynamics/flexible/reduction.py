@@ -1,0 +1,109 @@
+"""The frame of the full model in modal coordinates: what the compiled kernels step, and what they read out.
+
+q = Φ η, with Φ of the frame's natural modes (ΦᵀMΦ = 1, ΦᵀKΦ = diag ω²), so that a force at S and the deck's motion
+reach each coordinate separately. With all modes the model is the full one, only in other coordinates. With fewer, the
+static shapes of a force at S and of a uniform field (own weight, acceleration of the deck) stand beside the lowest
+modes: the truncation then costs nothing at rest, and little in a sea.
+
+Vectors are along {D}, the deck's axes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.linalg import eigh
+
+from aframe_env.crane import Frame
+from aframe_env.dynamics.rfem.beam import Array
+from aframe_env.dynamics.rfem.chain import Division
+from aframe_env.dynamics.rfem.model import CarriedInertia, FrameModel, apply_blocks, frame_model
+
+CARRIED_MODES = 8
+"""Modes whose own displacement feels the turning of the deck, E(W) q and E(2 Ω×) q̇; the lowest ones."""
+STATIC_SHAPES = 6
+"""Static shapes beside the modes of a reduced frame: a force at S and a uniform field, three each."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModalFrame:
+    """A frame of m modal coordinates η."""
+
+    model: FrameModel
+    shape: Array
+    """Φ, (n, m)."""
+    square: Array
+    """ω², (m,), 1/s²."""
+    damping: Array
+    """ΦᵀLΦ, (m, m), 1/s."""
+    pulley: Array
+    """Displacement of S, (3, m)."""
+    uniform: Array
+    """Generalised forces of a unit uniform field, (m, 3)."""
+    turning: Array
+    """Generalised inertial terms E_1 of the undeformed frame for W = α× + Ω×Ω×, (m, 3, 3)."""
+    carried: Array
+    """The same of the displaced one, E(W) = Σ W_cd carried[:, :, c, d], in the lowest c modes, (c, c, 3, 3)."""
+    feedback: Array
+    """E(W) of those modes on the frame's own coordinates, (n, c, 3, 3); for the reactions."""
+
+    @property
+    def count(self) -> int:
+        """m."""
+        return self.square.size
+
+
+def basis(model: FrameModel, modes: int | None) -> tuple[Array, Array]:
+    """ω², (m,), and modes of the free coordinates, (n_z, m): all, or the lowest ``modes`` and the static shapes."""
+    stiffness = model.reduced_stiffness
+    squares, vectors = eigh(stiffness)
+    if modes is None or modes + STATIC_SHAPES >= squares.size:
+        return squares, vectors
+    loads = model.constraints.basis.T @ np.hstack([model.pulley.T, model.uniform_field()])
+    # A static shape less its share in the modes that are kept is a sum of the modes that are not.
+    left = vectors[:, modes:]
+    shapes = left @ ((left.T @ loads) / squares[modes:, None])
+    directions, sizes, _ = np.linalg.svd(shapes / np.linalg.norm(shapes, axis=0), full_matrices=False)
+    kept = np.hstack([vectors[:, :modes], directions[:, sizes > 1e-9]])
+    reduced, mixed = eigh(kept.T @ stiffness @ kept)
+    return reduced, kept @ mixed
+
+
+@lru_cache(maxsize=8)
+def modal_frame(frame: Frame, division: Division, modes: int | None) -> ModalFrame:
+    """Modal form of a frame.
+
+    Args:
+        frame: Geometry, material, sections, servomotors.
+        division: Primary elements of legs and beam.
+        modes: How many natural modes to keep beside the static shapes; None for all.
+    """
+    model = frame_model(frame, division)
+    to_deck = model.to_deck
+    squares, vectors = basis(model, modes)
+    shape = model.constraints.basis @ vectors
+    inertia = CarriedInertia(model)
+    count = min(CARRIED_MODES, squares.size)
+    size = model.structure.size
+    turning = np.zeros((size, 3, 3))
+    feedback = np.zeros((size, count, 3, 3))
+    for c in range(3):
+        for d in range(3):
+            unit = np.outer(to_deck[c], to_deck[d])  # W of one entry along {D}, turned to {F}
+            turning[:, c, d] = inertia.constant(np.zeros(3), unit)
+            blocks = inertia.blocks(unit)
+            for mode in range(count):
+                feedback[:, mode, c, d] = apply_blocks(blocks, shape[:, mode])
+    return ModalFrame(
+        model=model,
+        shape=shape,
+        square=squares,
+        damping=shape.T @ model.damping @ shape,
+        pulley=to_deck @ model.pulley @ shape,
+        uniform=shape.T @ model.uniform_field() @ to_deck.T,
+        turning=np.einsum("nm,ncd->mcd", shape, turning),
+        carried=np.einsum("na,nbcd->abcd", shape[:, :count], feedback),
+        feedback=feedback,
+    )
