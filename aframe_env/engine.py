@@ -82,8 +82,7 @@ class Engine:
         self._record_of: dict[int, tuple[TabledMotion, int, int]] = {}
         # Lanes beyond the last row hold the paper's case, so that no lane computes with zeros for parameters.
         idle = self.row_vector(Scenario.paper())
-        view = self._view
-        view[...] = idle[None, :, None]
+        self._fill(idle)
 
     @property
     def _view(self) -> FloatArray:
@@ -118,7 +117,7 @@ class Engine:
             column[:full] = commands[: full * self._lanes].reshape(full, self._lanes)
             if rest:
                 column[full, :rest] = commands[full * self._lanes :]
-        self._step(self._blocks, self._components, self._segments, self._records)
+        self._advance()
 
     def reset_row(self, index: int, scenario: Scenario) -> None:
         """Put a row at the start of a scenario."""
@@ -131,6 +130,10 @@ class Engine:
         view[block, : len(vector), lane] = vector
         view[block, len(vector) :, lane] = 0.0
 
+    def restore_row(self, index: int, vector: FloatArray, scenario: Scenario) -> None:
+        """Put back a row of ``scenario`` that ``copy_row`` of this or a like engine gave."""
+        self.write_row(index, self._adopt(vector, scenario))
+
     def copy_row(self, index: int) -> FloatArray:
         """Return everything the engine knows of a row: (slots,)."""
         block, lane = divmod(index, self._lanes)
@@ -138,7 +141,7 @@ class Engine:
 
     def row_vector(self, scenario: Scenario) -> FloatArray:
         """Slots of a row at the start of a scenario: (slots,)."""
-        times = timing(scenario, self.control_period, self._max_inner_step)
+        times = self._timing(scenario)
         motion: ShipMotion = scenario.motion
         if isinstance(motion, ComponentMotion):
             components = motion.components()
@@ -155,6 +158,24 @@ class Engine:
         _place_load(row, scenario)
         self._kernels_of_one.start(row[None], self._components, self._records)
         return row
+
+    def _fill(self, vector: FloatArray) -> None:
+        """Put every lane where ``vector`` (slots,) says."""
+        self._view[...] = vector[None, :, None]
+
+    def _advance(self) -> None:
+        self._step(self._blocks, self._components, self._segments, self._records)
+
+    def _timing(self, scenario: Scenario) -> Timing:
+        return timing(scenario, self.control_period, self._max_inner_step)
+
+    def _adopt(self, vector: FloatArray, scenario: Scenario) -> FloatArray:
+        """Make room for a row of another engine, and point it at this engine's tables: (slots,)."""
+        self._make_room((len(vector) - at.ROW_SLOTS) // at.COMPONENT_SLOTS)
+        adopted = vector.copy()
+        if isinstance(scenario.motion, TabledMotion) and not isinstance(scenario.motion, ComponentMotion):
+            adopted[at.RECORD] = self._record(scenario.motion, self._timing(scenario).segment)[0]
+        return adopted
 
     @property
     def _kernels_of_one(self):  # type: ignore[no-untyped-def]

@@ -35,7 +35,9 @@ CARRIED: Final = 76
 CARRIED_MOST: Final = 8
 TIP: Final = CARRIED + 9 * CARRIED_MOST
 """Displacement of S and its rate at the end of the step but for the coming pull of the rope, 6."""
-MODES: Final = TIP + 6
+BEFORE: Final = TIP + 6
+"""Deck's coordinates, rates and accelerations at the segment's start, 18."""
+MODES: Final = BEFORE + 18
 """MODE_SLOTS for each mode from here on."""
 POSITION: Final = 0
 RATE: Final = 1

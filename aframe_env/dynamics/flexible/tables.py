@@ -67,7 +67,7 @@ def step_table(frame: Frame, division: Division, modes: int | None, step: float)
     of_modes[:, at.RESPONSE : at.RESPONSE + 3] = response
     of_modes[:, at.FIELD : at.FIELD + 3] = modal.uniform
     of_modes[:, at.FIELD + 3 : at.FIELD + 12] = -modal.turning.reshape(count, 9)
-    matrix = -modal.carried.transpose(0, 1, 2, 3).reshape(carried, 9 * carried)
+    matrix = -modal.carried.reshape(carried, 9 * carried)
     parts = [head, of_modes.ravel(), matrix.ravel()]
     if coupled:
         parts.append(inverse.ravel())
