@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.compiling import scalar
 from aframe_env.dynamics.flexible import layout as flex
+from aframe_env.dynamics.flexible.blocks import nine, three
 
 Array = npt.NDArray[np.float64]
 
@@ -48,20 +48,24 @@ def write_carried(frame: Array, first: int, place: float, velocity: float, lanes
 
 
 @scalar
-def deck_force(frame: Array, table: Array, constants: int, lanes: int, j: int) -> float:
+def deck_force(
+    frame: Array, uniform: tuple[float, ...], turning: tuple[float, ...], lanes: int, j: int
+) -> float:
     """Weight and inertial terms of the deck's motion on a mode of the undeformed frame."""
     force = 0.0
-    for k in range(12):
-        force += table[constants + flex.FIELD + k] * frame[(flex.INPUT + k) * lanes + j]
+    for k in range(3):
+        force += uniform[k] * frame[(flex.INPUT + k) * lanes + j]
+    for k in range(9):
+        force += turning[k] * frame[(flex.INPUT + 3 + k) * lanes + j]
     return force
 
 
 @scalar
-def predict(row: Array, frame: Array, table: Array, line: float, index: int, lanes: int) -> None:
+def predict(frame: Array, table: Array, lanes: int) -> None:
     """First pass: modes to the step's end without the rope's force there, and TIP.
 
     POSITION and RATE become the end's share that is known already, ACCELERATION that without the rope's force. Lanes
-    of other frames, and those that have no step ``index``, stay as they are.
+    that are not ACTIVE stay as they are.
     """
     modes, carried, coupled, h = int(table[flex.COUNT]), int(table[flex.CARRIED_COUNT]), table[flex.COUPLED], table[3]
     matrix = flex.HEAD + flex.MODE_SIZE * modes
@@ -71,23 +75,28 @@ def predict(row: Array, frame: Array, table: Array, line: float, index: int, lan
         mode = flex.MODES + flex.MODE_SLOTS * i
         square, damping = table[c + flex.SQUARE], table[c + flex.DAMPING]
         early, late, inverse = table[c + flex.EARLY], table[c + flex.LATE], table[c + flex.INVERSE]
-        if i < carried:
-            for j in range(lanes):
-                frame[(mode + flex.RIGHT) * lanes + j] = 0.0
-            for k in range(9 * carried):
-                factor = table[matrix + 9 * carried * i + k]
-                for j in range(lanes):
-                    frame[(mode + flex.RIGHT) * lanes + j] += factor * frame[(flex.CARRIED + k) * lanes + j]
         for j in range(lanes):
-            active = frame[flex.FRAME * lanes + j] == line and index < row[at.SUBSTEPS * lanes + j]
+            frame[(mode + flex.RIGHT) * lanes + j] = 0.0
+        if i < carried:
+            for b in range(carried):
+                factors = nine(table, matrix + 9 * (carried * i + b), 1, 0)
+                for j in range(lanes):
+                    force = 0.0
+                    for k in range(9):
+                        force += factors[k] * frame[(flex.CARRIED + 9 * b + k) * lanes + j]
+                    frame[(mode + flex.RIGHT) * lanes + j] += force
+        # Constants are read before the loop over lanes: within it a store might have changed them, for all that
+        # the compiler knows, and the loop would not be vectorised.
+        uniform, turning = three(table, c + flex.FIELD, 1, 0), nine(table, c + flex.FIELD + 3, 1, 0)
+        for j in range(lanes):
+            active = frame[flex.ACTIVE * lanes + j] > 0.0
             place, rate, before = (
                 frame[(mode + flex.POSITION) * lanes + j],
                 frame[(mode + flex.RATE) * lanes + j],
                 frame[(mode + flex.ACCELERATION) * lanes + j],
             )
-            force = deck_force(frame, table, c, lanes, j)
-            if i < carried:
-                force += frame[(mode + flex.RIGHT) * lanes + j]
+            force = deck_force(frame, uniform, turning, lanes, j)
+            force += frame[(mode + flex.RIGHT) * lanes + j]
             new_place = place + h * rate + early * before
             new_rate = rate + 0.5 * h * before
             force -= square * new_place
@@ -97,12 +106,12 @@ def predict(row: Array, frame: Array, table: Array, line: float, index: int, lan
             frame[(mode + flex.RATE) * lanes + j] = new_rate if active else rate
             frame[(mode + flex.ACCELERATION) * lanes + j] = acceleration if active else before
     if coupled > 0.0:
-        solve_coupled(row, frame, table, line, index, modes, lanes)
+        solve_coupled(frame, table, modes, lanes)
     sum_tip(frame, table, modes, lanes)
 
 
 @scalar
-def solve_coupled(row: Array, frame: Array, table: Array, line: float, index: int, modes: int, lanes: int) -> None:
+def solve_coupled(frame: Array, table: Array, modes: int, lanes: int) -> None:
     """ACCELERATION where the damping couples the modes: the step's matrix A inverted beforehand.
 
     With h L / 2 = A - 1 - β h² ω² the damping force of the known rate needs no product of its own.
@@ -112,7 +121,7 @@ def solve_coupled(row: Array, frame: Array, table: Array, line: float, index: in
     for i in range(modes):
         mode = flex.MODES + flex.MODE_SLOTS * i
         for j in range(lanes):
-            active = frame[flex.FRAME * lanes + j] == line and index < row[at.SUBSTEPS * lanes + j]
+            active = frame[flex.ACTIVE * lanes + j] > 0.0
             before = frame[(mode + flex.ACCELERATION) * lanes + j]
             start = -(2.0 / h) * frame[(mode + flex.RATE) * lanes + j]
             frame[(mode + flex.ACCELERATION) * lanes + j] = start if active else before
@@ -120,7 +129,7 @@ def solve_coupled(row: Array, frame: Array, table: Array, line: float, index: in
             factor = table[inverse + modes * i + k]
             right = flex.MODES + flex.MODE_SLOTS * k + flex.RIGHT
             for j in range(lanes):
-                active = frame[flex.FRAME * lanes + j] == line and index < row[at.SUBSTEPS * lanes + j]
+                active = frame[flex.ACTIVE * lanes + j] > 0.0
                 share = factor * frame[right * lanes + j]
                 frame[(mode + flex.ACCELERATION) * lanes + j] += share if active else 0.0
 
@@ -150,7 +159,7 @@ def sum_tip(frame: Array, table: Array, modes: int, lanes: int) -> None:
 
 
 @scalar
-def finish(row: Array, frame: Array, table: Array, line: float, index: int, lanes: int) -> None:
+def finish(frame: Array, table: Array, lanes: int) -> None:
     """Second pass: the rope's force PULL at the step's end added, and the modes brought there."""
     half = 0.5 * table[flex.STEP]
     for i in range(int(table[flex.COUNT])):
@@ -159,7 +168,7 @@ def finish(row: Array, frame: Array, table: Array, line: float, index: int, lane
         r1, r2, r3 = table[c + flex.RESPONSE], table[c + flex.RESPONSE + 1], table[c + flex.RESPONSE + 2]
         late = table[c + flex.LATE]
         for j in range(lanes):
-            active = frame[flex.FRAME * lanes + j] == line and index < row[at.SUBSTEPS * lanes + j]
+            active = frame[flex.ACTIVE * lanes + j] > 0.0
             place, rate, free = (
                 frame[(mode + flex.POSITION) * lanes + j],
                 frame[(mode + flex.RATE) * lanes + j],

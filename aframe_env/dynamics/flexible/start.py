@@ -144,7 +144,8 @@ def release(
     for i in range(modes):
         c = flex.HEAD + flex.MODE_SIZE * i
         mode = flex.MODES + flex.MODE_SLOTS * i
-        total = deck_force(frame, table, c, lanes, j)
+        uniform, turning = three(table, c + flex.FIELD, 1, 0), nine(table, c + flex.FIELD + 3, 1, 0)
+        total = deck_force(frame, uniform, turning, lanes, j)
         for k in range(3):
             total += table[c + flex.SHAPE + k] * frame[(flex.PULL + k) * lanes + j]
         if i < carried:

@@ -29,14 +29,14 @@ LOAD_BETA: Final = 1.0 / 12.0
 
 
 @scalar
-def pull(row: Array, frame: Array, table: Array, line: float, index: int, lanes: int) -> None:
+def pull(row: Array, frame: Array, table: Array, index: int, lanes: int) -> None:
     """Bring drum and load to the end of inner step ``index``, and find the rope's force there."""
     h = table[flex.STEP]
     give, give_rate = nine(table, flex.GIVE, 1, 0), nine(table, flex.GIVE_RATE, 1, 0)
     late, half = LOAD_BETA * h * h, 0.5 * h
     early = (0.5 - LOAD_BETA) * h * h
     for j in range(lanes):
-        active = frame[flex.FRAME * lanes + j] == line and index < row[at.SUBSTEPS * lanes + j]
+        active = frame[flex.ACTIVE * lanes + j] > 0.0
         first, decay = row[(at.WINCH + 3) * lanes + j], row[at.HALF_STEP_DECAY * lanes + j]
         error0 = row[(at.WINCH + 4) * lanes + j]
         error = next_error(next_error(error0, 2.0 * index + 1.0, first, decay), 2.0 * index + 2.0, first, decay)
@@ -110,12 +110,15 @@ def charge(row: Array, z0: float, v0: float, z1: float, v1: float, h: float, lan
 
 
 @scalar
-def uses(frame: Array, line: float, lanes: int) -> bool:
-    """Whether any lane's frame is the one of that line of the tables."""
-    found = False
+def activate(row: Array, frame: Array, line: float, index: int, lanes: int) -> bool:
+    """Mark the rows of the frame in that line of the tables that have an inner step ``index``; whether any has."""
+    found = 0.0
     for j in range(lanes):
-        found = found or frame[flex.FRAME * lanes + j] == line
-    return found
+        own = 1.0 if frame[flex.FRAME * lanes + j] == line else 0.0
+        active = own if index < row[at.SUBSTEPS * lanes + j] else 0.0
+        frame[flex.ACTIVE * lanes + j] = active
+        found += active
+    return found > 0.0
 
 
 @scalar
@@ -135,10 +138,10 @@ def control_step(
         for index in range(int(most)):
             deck_at(row, frame, index, lanes)
             for line in range(tables.shape[0]):
-                if uses(frame, line, lanes):
-                    predict(row, frame, tables[line], line, index, lanes)
-                    pull(row, frame, tables[line], line, index, lanes)
-                    finish(row, frame, tables[line], line, index, lanes)
+                if activate(row, frame, line, index, lanes):
+                    predict(frame, tables[line], lanes)
+                    pull(row, frame, tables[line], index, lanes)
+                    finish(frame, tables[line], lanes)
     for j in range(lanes):
         row[at.OMEGA1 * lanes + j] += row[at.STEP_COST * lanes + j]
 
