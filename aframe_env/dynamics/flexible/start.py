@@ -12,7 +12,7 @@ from aframe_env.dynamics.compiling import scalar
 from aframe_env.dynamics.flexible import layout as flex
 from aframe_env.dynamics.flexible.blocks import nine, three
 from aframe_env.dynamics.flexible.deck import deck_now
-from aframe_env.dynamics.flexible.frame import deck_force, write_carried
+from aframe_env.dynamics.flexible.frame import deck_force, slots_of, write_carried
 from aframe_env.dynamics.flexible.rope import apply, apply_transposed, sweep, unit
 
 Array = npt.NDArray[np.float64]
@@ -140,7 +140,7 @@ def release(
     modes, carried = int(table[flex.COUNT]), int(table[flex.CARRIED_COUNT])
     for b in range(carried):
         place = frame[(flex.MODES + flex.MODE_SLOTS * b + flex.POSITION) * lanes + j]
-        write_carried(frame, flex.CARRIED + 9 * b, place, 0.0, lanes, j)
+        write_carried(frame, slots_of(frame, flex.CARRIED + 9 * b, 9, lanes), place, 0.0, lanes, j)
     for i in range(modes):
         c = flex.HEAD + flex.MODE_SIZE * i
         mode = flex.MODES + flex.MODE_SLOTS * i
