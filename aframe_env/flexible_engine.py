@@ -11,6 +11,7 @@ import numpy as np
 from aframe_env.crane import Frame
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.flexible import layout as flex
+from aframe_env.dynamics.flexible.readout import READOUTS, readout_kernel, readout_table
 from aframe_env.dynamics.flexible.reduction import STATIC_SHAPES
 from aframe_env.dynamics.flexible.step import flexible_kernels
 from aframe_env.dynamics.flexible.tables import step_table
@@ -54,9 +55,16 @@ class FlexibleEngine(Engine):
         self.mesh = mesh
         self._slots = flex.slots(mesh.room)
         self._lines: dict[tuple[Frame, float], int] = {}
-        self._tables = np.zeros((0, 0))
+        self._tables, self._readout_tables = np.zeros((0, 0)), np.zeros((0, 0))
         super().__init__(rows, control_period, components, max_inner_step)
         self._flexible_kernels = flexible_kernels(self._lanes)
+        self._readout = readout_kernel(self._lanes, rows > at.LANES)
+
+    def read_frames(self) -> FloatArray:
+        """Deflection of S, reactions, servomotor tensions and utilisation of all rows: (rows, READOUTS)."""
+        result = np.zeros((self.rows, READOUTS))
+        self._readout(self._frames, self._readout_tables, result)
+        return result
 
     @property
     def frames(self) -> FloatArray:
@@ -115,10 +123,18 @@ class FlexibleEngine(Engine):
         """Line of a scenario's frame in the tables, which it is added to when new."""
         key = scenario.crane.frame, self._timing(scenario).inner_step
         if key not in self._lines:
-            table = step_table(key[0], self.mesh.division, self.mesh.modes, key[1])
-            old = self._tables
-            self._tables = np.zeros((len(old) + 1, max(old.shape[1], table.size)))
-            self._tables[:-1, : old.shape[1]] = old
-            self._tables[-1, : table.size] = table
-            self._lines[key] = len(old)
+            mesh = self.mesh
+            self._tables = _with_line(self._tables, step_table(key[0], mesh.division, mesh.modes, key[1]))
+            self._readout_tables = _with_line(
+                self._readout_tables, readout_table(key[0], mesh.division, mesh.modes)
+            )
+            self._lines[key] = len(self._tables) - 1
         return self._lines[key]
+
+
+def _with_line(table: FloatArray, line: FloatArray) -> FloatArray:
+    """Add a line to a table, the shorter ones filled up with zeros."""
+    longer = np.zeros((len(table) + 1, max(table.shape[1], line.size)))
+    longer[:-1, : table.shape[1]] = table
+    longer[-1, : line.size] = line
+    return longer

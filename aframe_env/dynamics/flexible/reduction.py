@@ -39,20 +39,27 @@ class ModalFrame:
     damping: Array
     """ΦᵀLΦ, (m, m), 1/s."""
     pulley: Array
-    """Displacement of S, (3, m)."""
+    """Displacement of S by q, (3, n); its transpose takes a force at S to generalised forces."""
     uniform: Array
-    """Generalised forces of a unit uniform field, (m, 3)."""
+    """Generalised forces of a unit uniform field, (n, 3)."""
     turning: Array
-    """Generalised inertial terms E_1 of the undeformed frame for W = α× + Ω×Ω×, (m, 3, 3)."""
+    """Generalised inertial terms E_1 of the undeformed frame for W = α× + Ω×Ω×, (n, 3, 3)."""
     carried: Array
-    """The same of the displaced one, E(W) = Σ W_cd carried[:, :, c, d], in the lowest c modes, (c, c, 3, 3)."""
-    feedback: Array
-    """E(W) of those modes on the frame's own coordinates, (n, c, 3, 3); for the reactions."""
+    """The same of the lowest c modes' displacement, E(W) Φ = Σ W_cd carried[:, :, c, d], (n, c, 3, 3)."""
 
     @property
     def count(self) -> int:
         """m."""
         return self.square.size
+
+    @property
+    def carried_count(self) -> int:
+        """c."""
+        return self.carried.shape[1]
+
+    def project(self, forces: Array) -> Array:
+        """Generalised forces on η of those on q, (n, ...) → (m, ...)."""
+        return np.tensordot(self.shape.T, forces, axes=1)
 
 
 def basis(model: FrameModel, modes: int | None) -> tuple[Array, Array]:
@@ -88,22 +95,21 @@ def modal_frame(frame: Frame, division: Division, modes: int | None) -> ModalFra
     count = min(CARRIED_MODES, squares.size)
     size = model.structure.size
     turning = np.zeros((size, 3, 3))
-    feedback = np.zeros((size, count, 3, 3))
+    carried = np.zeros((size, count, 3, 3))
     for c in range(3):
         for d in range(3):
             unit = np.outer(to_deck[c], to_deck[d])  # W of one entry along {D}, turned to {F}
             turning[:, c, d] = inertia.constant(np.zeros(3), unit)
             blocks = inertia.blocks(unit)
             for mode in range(count):
-                feedback[:, mode, c, d] = apply_blocks(blocks, shape[:, mode])
+                carried[:, mode, c, d] = apply_blocks(blocks, shape[:, mode])
     return ModalFrame(
         model=model,
         shape=shape,
         square=squares,
         damping=shape.T @ model.damping @ shape,
-        pulley=to_deck @ model.pulley @ shape,
-        uniform=shape.T @ model.uniform_field() @ to_deck.T,
-        turning=np.einsum("nm,ncd->mcd", shape, turning),
-        carried=np.einsum("na,nbcd->abcd", shape[:, :count], feedback),
-        feedback=feedback,
+        pulley=to_deck @ model.pulley,
+        uniform=model.uniform_field() @ to_deck.T,
+        turning=turning,
+        carried=carried,
     )

@@ -44,18 +44,19 @@ def couples(modal: ModalFrame) -> bool:
 def step_table(frame: Frame, division: Division, modes: int | None, step: float) -> Array:
     """Constants of a frame's step of length ``step`` [s], (size,); see ``layout``."""
     modal = modal_frame(frame, division, modes)
-    count, carried, coupled = modal.count, modal.carried.shape[0], couples(modal)
+    count, carried, coupled = modal.count, modal.carried_count, couples(modal)
+    pulley = modal.pulley @ modal.shape
     beta = newmark_beta(modal.square, step)
     late = beta * step**2
     damping = modal.damping if coupled else np.diag(np.diag(modal.damping))
     inverse = np.linalg.inv(np.eye(count) + 0.5 * step * damping + np.diag(late * modal.square))
-    response = inverse @ modal.pulley.T
+    response = inverse @ pulley.T
 
     head = np.zeros(at.HEAD)
     head[at.COUNT], head[at.CARRIED_COUNT], head[at.COUPLED], head[at.STEP] = count, carried, coupled, step
-    head[at.GIVE : at.GIVE + 9] = ((modal.pulley * late) @ response).ravel()
-    head[at.GIVE_RATE : at.GIVE_RATE + 9] = (0.5 * step * modal.pulley @ response).ravel()
-    head[at.REST : at.REST + 9] = ((modal.pulley / modal.square) @ modal.pulley.T).ravel()
+    head[at.GIVE : at.GIVE + 9] = ((pulley * late) @ response).ravel()
+    head[at.GIVE_RATE : at.GIVE_RATE + 9] = (0.5 * step * pulley @ response).ravel()
+    head[at.REST : at.REST + 9] = ((pulley / modal.square) @ pulley.T).ravel()
 
     of_modes = np.zeros((count, at.MODE_SIZE))
     of_modes[:, at.SQUARE] = modal.square
@@ -63,11 +64,11 @@ def step_table(frame: Frame, division: Division, modes: int | None, step: float)
     of_modes[:, at.LATE] = late
     of_modes[:, at.EARLY] = (0.5 - beta) * step**2
     of_modes[:, at.INVERSE] = np.diag(inverse)
-    of_modes[:, at.SHAPE : at.SHAPE + 3] = modal.pulley.T
+    of_modes[:, at.SHAPE : at.SHAPE + 3] = pulley.T
     of_modes[:, at.RESPONSE : at.RESPONSE + 3] = response
-    of_modes[:, at.FIELD : at.FIELD + 3] = modal.uniform
-    of_modes[:, at.FIELD + 3 : at.FIELD + 12] = -modal.turning.reshape(count, 9)
-    matrix = -modal.carried.reshape(carried, 9 * carried)
+    of_modes[:, at.FIELD : at.FIELD + 3] = modal.project(modal.uniform)
+    of_modes[:, at.FIELD + 3 : at.FIELD + 12] = -modal.project(modal.turning).reshape(count, 9)
+    matrix = -modal.project(modal.carried)[:carried]
     parts = [head, of_modes.ravel(), matrix.ravel()]
     if coupled:
         parts.append(inverse.ravel())
