@@ -93,10 +93,18 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     `time` [s], `load_position` (3,) [m], `rope_tension` [N], `slack` (the rope was slack within the last step),
     `omega1` [m² s] and `omega2` [m] so far, eqs. (31), (32).
 
+    With `model="rfem"` also, vectors along the deck's axes: `pulley_deflection` (3,) [m] of S on the frame;
+    `foot_reactions` (2, 3) [N], forces on the frame at A_R and A_L; `servomotor_tensions` (2,) [N] of S_R and S_L;
+    `utilisation`, the largest von Mises stress between two rfes over the yield strength. The pulley of the
+    observation is the one of the rigid frame in both models: it is what a motion reference unit on the deck tells.
+
     ## Arguments
     All by keyword, as in `gymnasium.make("AFrameHeave-v0", control_period=0.2)`:
 
-    - `model`: "simplified".
+    - `model`: "simplified", or "rfem": the frame flexible, as rigid finite elements, eqs. (1)-(30).
+    - `rfes`: with "rfem", elements of a leg and of the top beam (default `(10, 8)`; the beam's even).
+    - `rfem_modes`: with "rfem", the number of natural modes to keep, beside six static shapes (a force at S, and a
+      uniform field); None (default) for all. Ten are many: see `benchmarks/rfem.py` for speed and error.
     - `scenario`: a `Scenario` for every episode, or the `ScenarioDistribution` to draw from. Default: Hs 0.5-4 m,
       Tp 6-14 s, any heading, load 20-100 t, rope 50-1500 m.
     - `control_period`: 0.001 to 2 s (default 0.1).
@@ -119,6 +127,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
         episode_duration: float = 60.0,
         observation: task.Observation = "state",
         max_inner_step: float | None = None,
+        rfes: tuple[int, int] | None = None,
+        rfem_modes: int | None = None,
         render_mode: str | None = None,
     ) -> None:
         if render_mode is not None:
@@ -131,6 +141,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
             episode_duration=episode_duration,
             observation=observation,
             max_inner_step=max_inner_step,
+            rfes=rfes,
+            rfem_modes=rfem_modes,
         )
         self.observation_space = self._simulation.observation_space  # type: ignore[assignment]
         self.action_space = self._simulation.action_space
@@ -196,9 +208,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
         self._simulation.write_row(0, state.row)
         self.np_random.bit_generator.state = state.generator
 
-    @staticmethod
-    def _info(results: list[float]) -> dict[str, Any]:
-        return {
+    def _info(self, results: list[float]) -> dict[str, Any]:
+        info = {
             "time": results[task.TIME],
             "load_position": np.array(results[task.LOAD : task.LOAD + 3]),
             "rope_tension": results[task.TENSION],
@@ -206,6 +217,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
             "omega1": results[task.OMEGA1],
             "omega2": results[task.OMEGA2],
         }
+        frames = self._simulation.frames()
+        return info if frames is None else info | {key: value[0] for key, value in task.frame_info(frames).items()}
 
 
 def _scenario_option(options: dict[str, Any] | None) -> Any:

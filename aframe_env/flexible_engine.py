@@ -18,11 +18,14 @@ from aframe_env.dynamics.flexible.tables import step_table
 from aframe_env.dynamics.rfem.chain import Division
 from aframe_env.engine import Engine, FloatArray, Timing
 from aframe_env.scenario import Scenario
+from aframe_env.validation import InvalidValue, require_integer
 
 FLEXIBLE_STEP: Final = 0.01
 """Longest inner step, s."""
 ROPE_PHASE: Final = 0.25
 """Most that the load's bobbing on the rope turns in one inner step, rad; the scheme is stable up to some 2.4."""
+MOST_RFES: Final = 100
+"""Of a member: the modes of a finer frame take too long to find."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,26 @@ class Mesh:
         """Most modal coordinates that a frame can have."""
         free = 6 * (2 * self.division.leg + self.division.beam + 1) - 6
         return free if self.modes is None else min(free, self.modes + STATIC_SHAPES)
+
+
+def mesh_of(model: str, rfes: tuple[int, int] | None, modes: int | None) -> Mesh | None:
+    """Mesh that an environment's arguments ask for; None for the simplified model, which takes none of them."""
+    if model != "rfem":
+        for name, value in (("rfes", rfes), ("rfem_modes", modes)):
+            if value is not None:
+                raise InvalidValue(f'{name} = {value!r}: only with model="rfem"')
+        return None
+    if modes is not None:
+        require_integer("rfem_modes", modes, low=1, high=10_000)
+    if rfes is None:
+        return Mesh(Division(), modes)
+    if not isinstance(rfes, tuple) or len(rfes) != 2:
+        raise InvalidValue(f"rfes = {rfes!r}: must be a pair of integers, the elements of a leg and of the beam")
+    require_integer("rfes (leg)", rfes[0], low=1, high=MOST_RFES)
+    require_integer("rfes (beam)", rfes[1], low=2, high=MOST_RFES)
+    if rfes[1] % 2:
+        raise InvalidValue(f"rfes = {rfes!r}: the beam's number must be even, for S to lie on its middle rfe")
+    return Mesh(Division(leg=rfes[0], beam=rfes[1]), modes)
 
 
 class FlexibleEngine(Engine):
