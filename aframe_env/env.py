@@ -218,7 +218,9 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
             "omega2": results[task.OMEGA2],
         }
         frames = self._simulation.frames()
-        return info if frames is None else info | {key: value[0] for key, value in task.frame_info(frames).items()}
+        if frames is not None:
+            info |= {key: value[0] for key, value in task.frame_info(frames).items()}
+        return info
 
 
 def _scenario_option(options: dict[str, Any] | None) -> Any:

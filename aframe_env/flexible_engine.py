@@ -148,9 +148,7 @@ class FlexibleEngine(Engine):
         if key not in self._lines:
             mesh = self.mesh
             self._tables = _with_line(self._tables, step_table(key[0], mesh.division, mesh.modes, key[1]))
-            self._readout_tables = _with_line(
-                self._readout_tables, readout_table(key[0], mesh.division, mesh.modes)
-            )
+            self._readout_tables = _with_line(self._readout_tables, readout_table(key[0], mesh.division, mesh.modes))
             self._lines[key] = len(self._tables) - 1
         return self._lines[key]
 

@@ -99,9 +99,7 @@ def write_pose(
     yaw: tuple[float, float, float],
 ) -> None:
     """Write lane j's pose and INPUT, from the deck's coordinates (each with its rate and acceleration)."""
-    turned, spin, spin_up = turn(
-        roll[0], pitch[0], yaw[0], roll[1], pitch[1], yaw[1], roll[2], pitch[2], yaw[2]
-    )
+    turned, spin, spin_up = turn(roll[0], pitch[0], yaw[0], roll[1], pitch[1], yaw[1], roll[2], pitch[2], yaw[2])
     for k in range(9):
         frame[(flex.ROTATION + k) * lanes + j] = turned[k]
     frame[flex.ORIGIN * lanes + j] = surge[0]

@@ -95,9 +95,7 @@ def place_load(
 
 
 @scalar
-def release(
-    row: Array, frame: Array, table: Array, deflection: tuple[float, float, float], lanes: int, j: int
-) -> None:
+def release(row: Array, frame: Array, table: Array, deflection: tuple[float, float, float], lanes: int, j: int) -> None:
     """Rope force at the start, and the accelerations of load and modes that follow from it."""
     p1, p2, p3 = three(row, at.PULLEY_ON_DECK, lanes, j)
     pulley = (p1 + deflection[0], p2 + deflection[1], p3 + deflection[2])

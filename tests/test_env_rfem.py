@@ -1,0 +1,191 @@
+"""The environments on the full model: Gymnasium's checks, scalar against vector, states, information."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import warnings
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from aframe_env import InvalidValue, Scenario
+from aframe_env.crane import Crane
+from aframe_env.dynamics.rfem.chain import Division
+from aframe_env.dynamics.rfem.model import frame_model
+from aframe_env.dynamics.rfem.statics import LoadCase
+from aframe_env.motion import HarmonicMotion
+from aframe_env.section import Material
+
+STILL = np.zeros(1, dtype=np.float32)
+MESH = {"model": "rfem", "rfes": (5, 2)}
+FRAME_KEYS = ("pulley_deflection", "foot_reactions", "servomotor_tensions", "utilisation")
+
+
+def stiffer(factor: float) -> Crane:
+    frame = Crane().frame
+    material = Material(young_modulus=2.1e11 * factor, shear_modulus=8.1e10 * factor)
+    return Crane(frame=replace(frame, structure=replace(frame.structure, material=material)))
+
+
+@pytest.mark.parametrize("arguments", [{}, {"rfem_modes": 6, "observation": "sensors"}])
+def test_gymnasium_check(arguments):
+    env = gymnasium.make("AFrameHeave-v0", **MESH, **arguments).unwrapped
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", message=".*symmetric and normalized.*")
+        check_env(env, skip_render_check=True)
+
+
+def test_spaces_are_those_of_the_simplified_model():
+    flexible, rigid = gymnasium.make("AFrameHeave-v0", **MESH), gymnasium.make("AFrameHeave-v0")
+    assert flexible.observation_space == rigid.observation_space
+    assert flexible.action_space == rigid.action_space
+
+
+def test_information_at_rest_is_that_of_statics():
+    env = gymnasium.make("AFrameHeave-v0", scenario=Scenario.paper(motion=HarmonicMotion()), **MESH)
+    _, info = env.reset(seed=0)
+    for _ in range(20):
+        _, _, _, _, info = env.step(STILL)
+    # Statics has the rope's second leg along the undeformed line, so that they differ by some 1e-3.
+    expected = Crane().static(
+        LoadCase(own_weight=True, rope_tension=981e3), model=frame_model(Crane().frame, Division(leg=5, beam=2))
+    )
+    assert info["rope_tension"] == pytest.approx(981e3, rel=1e-9)
+    assert info["pulley_deflection"] == pytest.approx(expected.displacement["S"], rel=3e-3, abs=1e-9)
+    assert info["foot_reactions"][0] == pytest.approx(expected.reactions["A_R"], rel=3e-3)
+    assert info["foot_reactions"][1] == pytest.approx(expected.reactions["A_L"], rel=3e-3)
+    assert info["servomotor_tensions"] == pytest.approx([expected.servomotor_tension["R"]] * 2, rel=3e-3)
+
+
+@pytest.mark.parametrize("rows", [2, 70])
+def test_scalar_row_is_vector_row(rows):
+    arguments = {"episode_duration": 2.0, **MESH}
+    vector = gymnasium.make_vec("AFrameHeave-v0", num_envs=rows, vectorization_mode="vector_entry_point", **arguments)
+    k = rows - 1
+    scalar = gymnasium.make("AFrameHeave-v0", **arguments)
+    observations, infos = vector.reset(seed=10)
+    expected, info = scalar.reset(seed=10 + k)
+    rng = np.random.default_rng(1)
+    done = False
+    for _ in range(45):
+        actions = rng.uniform(-2.0, 2.0, (rows, 1)).astype(np.float32)
+        np.testing.assert_array_equal(observations[k], expected)
+        for key in FRAME_KEYS:
+            np.testing.assert_array_equal(infos[key][k], info[key])
+        observations, rewards, terminations, truncations, infos = vector.step(actions)
+        if done:
+            expected, info = scalar.reset()
+            reward, terminated, truncated = 0.0, False, False
+        else:
+            expected, reward, terminated, truncated, info = scalar.step(actions[k])
+        assert (rewards[k], terminations[k], truncations[k]) == (reward, terminated, truncated)
+        done = terminated or truncated
+
+
+def test_rows_may_have_different_cranes_and_ropes():
+    scenarios = [
+        Scenario.paper(initial="rest"),
+        Scenario.paper(initial="rest", crane=stiffer(3.0)),
+        Scenario.paper(initial="rest", target_level=-20.0, load_mass=3e3),
+    ]
+    vector = gymnasium.make_vec("AFrameHeave-v0", num_envs=3, vectorization_mode="vector_entry_point", **MESH)
+    vector.reset(seed=0, options={"scenario": scenarios})
+    for _ in range(5):
+        rows = vector.step(np.full((3, 1), 0.5, dtype=np.float32))
+    for k, scenario in enumerate(scenarios):
+        scalar = gymnasium.make("AFrameHeave-v0", **MESH)
+        scalar.reset(seed=k, options={"scenario": scenario})
+        for _ in range(5):
+            row = scalar.step(np.full(1, 0.5, dtype=np.float32))
+        np.testing.assert_array_equal(rows[0][k], row[0])
+        np.testing.assert_array_equal(rows[4]["foot_reactions"][k], row[4]["foot_reactions"])
+
+
+@pytest.mark.parametrize("clone", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_copies_go_on_identically(clone):
+    env = gymnasium.make("AFrameHeave-v0", observation="sensors", **MESH).unwrapped
+    env.reset(seed=4)
+    for _ in range(20):
+        env.step(np.array([0.3], dtype=np.float32))
+    twin = clone(env)
+    for _ in range(20):
+        np.testing.assert_array_equal(env.step(STILL)[0], twin.step(STILL)[0])
+    np.testing.assert_array_equal(env.reset()[0], twin.reset()[0])
+
+
+def test_state_goes_to_another_environment():
+    # The other has met another crane before: its tables are in another order.
+    env, other = (gymnasium.make("AFrameHeave-v0", **MESH).unwrapped for _ in range(2))
+    env.reset(seed=4)
+    other.reset(seed=5, options={"scenario": Scenario.paper(crane=stiffer(2.0))})
+    env.reset(options={"scenario": Scenario.paper(crane=stiffer(5.0))})
+    for _ in range(3):
+        env.step(STILL)
+    other.set_state(env.get_state())
+    for _ in range(10):
+        one, two = env.step(STILL), other.step(STILL)
+        np.testing.assert_array_equal(one[0], two[0])
+        np.testing.assert_array_equal(one[4]["foot_reactions"], two[4]["foot_reactions"])
+
+
+def test_last_information_of_rows_that_are_reset():
+    vector = gymnasium.make_vec(
+        "AFrameHeave-v0",
+        num_envs=2,
+        vectorization_mode="vector_entry_point",
+        episode_duration=0.3,
+        autoreset_mode="SameStep",
+        **MESH,
+    )
+    vector.reset(seed=0)
+    for _ in range(3):
+        infos = vector.step(np.zeros((2, 1), dtype=np.float32))[4]
+    assert infos["final_info"]["foot_reactions"].shape == (2, 2, 3)
+    assert not np.array_equal(infos["final_info"]["foot_reactions"], infos["foot_reactions"])
+
+
+def test_return_is_minus_omega1():
+    env = gymnasium.make("AFrameHeave-v0", episode_duration=10.0, **MESH)
+    env.reset(seed=3)
+    rng = np.random.default_rng(0)
+    total, done = 0.0, False
+    while not done:
+        _, reward, terminated, truncated, info = env.step(rng.uniform(-1.0, 1.0, 1).astype(np.float32))
+        total += float(reward)
+        done = terminated or truncated
+    assert total == pytest.approx(-info["omega1"], rel=1e-12)
+
+
+def test_a_rope_that_parts_ends_the_episode():
+    rope = replace(Crane().rope, breaking_load=1.0e6)
+    env = gymnasium.make("AFrameHeave-v0", scenario=Scenario.paper(crane=Crane(rope=rope)), **MESH)
+    env.reset(seed=0)
+    terminated, reward = False, 0.0
+    for _ in range(100):
+        _, reward, terminated, _, info = env.step(STILL)
+        if terminated:
+            break
+    assert terminated
+    assert info["rope_tension"] == 0.0
+    assert reward < -1e6
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"rfes": (10, 8)}, r"rfes = \(10, 8\): only with model=\"rfem\""),
+        ({"rfem_modes": 5}, r"rfem_modes = 5: only with"),
+        ({"model": "rfem", "rfes": (10, 7)}, r"rfes = \(10, 7\): the beam's number must be even"),
+        ({"model": "rfem", "rfes": 10}, r"rfes = 10: must be a pair"),
+        ({"model": "rfem", "rfes": (0, 2)}, r"rfes \(leg\) = 0"),
+        ({"model": "rfem", "rfem_modes": 0}, r"rfem_modes = 0"),
+    ],
+)
+def test_bad_input(arguments, message):
+    with pytest.raises(InvalidValue, match=message):
+        gymnasium.make("AFrameHeave-v0", **arguments)
