@@ -56,7 +56,7 @@ def test_information_at_rest_is_that_of_statics():
         LoadCase(own_weight=True, rope_tension=981e3), model=frame_model(Crane().frame, Division(leg=5, beam=2))
     )
     assert info["rope_tension"] == pytest.approx(981e3, rel=1e-9)
-    assert info["pulley_deflection"] == pytest.approx(expected.displacement["S"], rel=3e-3, abs=1e-9)
+    assert info["pulley_deflection"] == pytest.approx(expected.displacement["S"], rel=1e-2, abs=1e-9)
     assert info["foot_reactions"][0] == pytest.approx(expected.reactions["A_R"], rel=3e-3)
     assert info["foot_reactions"][1] == pytest.approx(expected.reactions["A_L"], rel=3e-3)
     assert info["servomotor_tensions"] == pytest.approx([expected.servomotor_tension["R"]] * 2, rel=3e-3)

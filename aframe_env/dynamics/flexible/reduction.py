@@ -55,7 +55,7 @@ class ModalFrame:
     @property
     def carried_count(self) -> int:
         """c."""
-        return self.carried.shape[1]
+        return int(self.carried.shape[1])
 
     def project(self, forces: Array) -> Array:
         """Generalised forces on η of those on q, (n, ...) → (m, ...)."""

@@ -49,7 +49,7 @@ def step_table(frame: Frame, division: Division, modes: int | None, step: float)
     beta = newmark_beta(modal.square, step)
     late = beta * step**2
     damping = modal.damping if coupled else np.diag(np.diag(modal.damping))
-    inverse = np.linalg.inv(np.eye(count) + 0.5 * step * damping + np.diag(late * modal.square))
+    inverse: Array = np.linalg.inv(np.eye(count) + 0.5 * step * damping + np.diag(late * modal.square))
     response = inverse @ pulley.T
 
     head = np.zeros(at.HEAD)
