@@ -49,7 +49,7 @@ def step_table(frame: Frame, division: Division, modes: int | None, step: float)
     beta = newmark_beta(modal.square, step)
     late = beta * step**2
     damping = modal.damping if coupled else np.diag(np.diag(modal.damping))
-    inverse: Array = np.linalg.inv(np.eye(count) + 0.5 * step * damping + np.diag(late * modal.square))
+    inverse = np.linalg.inv(np.eye(count) + 0.5 * step * damping + np.diag(late * modal.square))
     response = inverse @ pulley.T
 
     head = np.zeros(at.HEAD)
@@ -71,5 +71,5 @@ def step_table(frame: Frame, division: Division, modes: int | None, step: float)
     matrix = -modal.project(modal.carried)[:carried]
     parts = [head, of_modes.ravel(), matrix.ravel()]
     if coupled:
-        parts.append(inverse.ravel())
+        parts.append(np.asarray(inverse.ravel(), dtype=np.float64))
     return np.concatenate(parts)
