@@ -20,7 +20,7 @@ from aframe_env.engine import Engine, FloatArray, Timing
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_integer
 
-FLEXIBLE_STEP: Final = 0.01
+FLEXIBLE_STEP: Final = 0.0125
 """Longest inner step, s."""
 ROPE_PHASE: Final = 0.25
 """Most that the load's bobbing on the rope turns in one inner step, rad; the scheme is stable up to some 2.4."""
