@@ -2,8 +2,9 @@
 
 q = Φ η, with Φ of the frame's natural modes (ΦᵀMΦ = 1, ΦᵀKΦ = diag ω²), so that a force at S and the deck's motion
 reach each coordinate separately. With all modes the model is the full one, only in other coordinates. With fewer, the
-static shapes of a force at S and of a uniform field (own weight, acceleration of the deck) stand beside the lowest
-modes: the truncation then costs nothing at rest, and little in a sea.
+static shapes of what acts on the frame stand beside the lowest modes: a force at S, a uniform field (own weight,
+acceleration of the deck), angular acceleration of the deck. The truncation then costs nothing at rest, some 1e-4 of the
+reactions in a sea; only what makes the frame ring (a sudden start) excites the modes that are left out.
 
 Vectors are along {D}, the deck's axes.
 """
@@ -23,8 +24,9 @@ from aframe_env.dynamics.rfem.model import CarriedInertia, FrameModel, apply_blo
 
 CARRIED_MODES = 8
 """Modes whose own displacement feels the turning of the deck, E(W) q and E(2 Ω×) q̇; the lowest ones."""
-STATIC_SHAPES = 6
-"""Static shapes beside the modes of a reduced frame: a force at S and a uniform field, three each."""
+STATIC_SHAPES = 9
+"""Static shapes beside the modes of a reduced frame: a force at S, a uniform field, the deck's angular acceleration,
+three each."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,16 +64,18 @@ class ModalFrame:
         return np.tensordot(self.shape.T, forces, axes=1)
 
 
-def basis(model: FrameModel, modes: int | None) -> tuple[Array, Array]:
-    """ω², (m,), and modes of the free coordinates, (n_z, m): all, or the lowest ``modes`` and the static shapes."""
+def basis(model: FrameModel, modes: int | None, loads: Array) -> tuple[Array, Array]:
+    """ω², (m,), and modes of the free coordinates, (n_z, m): all, or the lowest ``modes`` and static shapes.
+
+    ``loads`` are the generalised forces (n, k) of the static shapes.
+    """
     stiffness = model.reduced_stiffness
     squares, vectors = eigh(stiffness)
     if modes is None or modes + STATIC_SHAPES >= squares.size:
         return squares, vectors
-    loads = model.constraints.basis.T @ np.hstack([model.pulley.T, model.uniform_field()])
     # A static shape less its share in the modes that are kept is a sum of the modes that are not.
     left = vectors[:, modes:]
-    shapes = left @ ((left.T @ loads) / squares[modes:, None])
+    shapes = left @ ((left.T @ model.constraints.basis.T @ loads) / squares[modes:, None])
     directions, sizes, _ = np.linalg.svd(shapes / np.linalg.norm(shapes, axis=0), full_matrices=False)
     kept = np.hstack([vectors[:, :modes], directions[:, sizes > 1e-9]])
     reduced, mixed = eigh(kept.T @ stiffness @ kept)
@@ -89,27 +93,28 @@ def modal_frame(frame: Frame, division: Division, modes: int | None) -> ModalFra
     """
     model = frame_model(frame, division)
     to_deck = model.to_deck
-    squares, vectors = basis(model, modes)
-    shape = model.constraints.basis @ vectors
     inertia = CarriedInertia(model)
-    count = min(CARRIED_MODES, squares.size)
-    size = model.structure.size
-    turning = np.zeros((size, 3, 3))
-    carried = np.zeros((size, count, 3, 3))
-    for c in range(3):
-        for d in range(3):
-            unit = np.outer(to_deck[c], to_deck[d])  # W of one entry along {D}, turned to {F}
-            turning[:, c, d] = inertia.constant(np.zeros(3), unit)
-            blocks = inertia.blocks(unit)
-            for mode in range(count):
-                carried[:, mode, c, d] = apply_blocks(blocks, shape[:, mode])
+    # W of one entry along {D}, turned to {F}.
+    units = {(c, d): np.outer(to_deck[c], to_deck[d]) for c in range(3) for d in range(3)}
+    turning = np.zeros((model.structure.size, 3, 3))
+    for (c, d), unit in units.items():
+        turning[:, c, d] = inertia.constant(np.zeros(3), unit)
+    pulley, uniform = to_deck @ model.pulley, model.uniform_field() @ to_deck.T
+    spin_up = np.stack([turning[:, d, c] - turning[:, c, d] for c, d in ((1, 2), (2, 0), (0, 1))], axis=1)
+    squares, vectors = basis(model, modes, np.hstack([pulley.T, uniform, spin_up]))
+    shape = model.constraints.basis @ vectors
+    carried = np.zeros((model.structure.size, min(CARRIED_MODES, squares.size), 3, 3))
+    for (c, d), unit in units.items():
+        blocks = inertia.blocks(unit)
+        for mode in range(carried.shape[1]):
+            carried[:, mode, c, d] = apply_blocks(blocks, shape[:, mode])
     return ModalFrame(
         model=model,
         shape=shape,
         square=squares,
         damping=shape.T @ model.damping @ shape,
-        pulley=to_deck @ model.pulley,
-        uniform=model.uniform_field() @ to_deck.T,
+        pulley=pulley,
+        uniform=uniform,
         turning=turning,
         carried=carried,
     )
