@@ -33,7 +33,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     A load of 20 to 100 t hangs on an elastic rope from an A-frame at the stern of a ship in a random sea. The drum
     pays rope out and in. The load shall stay at its required level h. The model is the simplified one of
     Adamiec-Wójcik, Fałat, Maczyński and Wojciech (2009), eqs. (37)-(41): rigid frame, six-degree-of-freedom ship
-    motion, the load a particle on a rope that is elastic, damped and cannot push.
+    motion, the load a particle on a rope that is elastic, damped and cannot push; or, with `model="rfem"`, their full
+    one, eqs. (1)-(30), with the frame a chain of rigid finite elements.
 
     Axes: x outboard (aft), z up, y to the left of somebody who looks outboard; origin at the mean place of the deck
     frame, midway between the frame's feet. SI units, angles in radians.
@@ -101,7 +102,7 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     ## Arguments
     All by keyword, as in `gymnasium.make("AFrameHeave-v0", control_period=0.2)`:
 
-    - `model`: "simplified", or "rfem": the frame flexible, as rigid finite elements, eqs. (1)-(30).
+    - `model`: "simplified" or "rfem".
     - `rfes`: with "rfem", elements of a leg and of the top beam (default `(10, 8)`; the beam's even).
     - `rfem_modes`: with "rfem", how many natural modes to keep beside nine static shapes; None (default): all. With 5
       the load moves as with all to 1e-9, reactions to 1e-3 of their range, in seas that build up over some seconds.

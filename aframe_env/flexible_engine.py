@@ -74,7 +74,7 @@ class FlexibleEngine(Engine):
         components: int = 32,
         max_inner_step: float | None = None,
     ) -> None:
-        """Arguments as for ``Engine``, and the mesh."""
+        """Arguments as for ``Engine``, and the mesh. A stiff rope shortens ``max_inner_step`` too."""
         self.mesh = mesh
         self._slots = flex.slots(mesh.room)
         self._lines: dict[tuple[Frame, float], int] = {}
@@ -136,11 +136,11 @@ class FlexibleEngine(Engine):
 
     def _timing(self, scenario: Scenario) -> Timing:
         segment = self.control_period / self._segments
-        longest = FLEXIBLE_STEP
+        longest = self._max_inner_step or FLEXIBLE_STEP
         # Halved rather than fitted, so that a distribution of ropes needs few tables.
         while longest * scenario.rope_frequency > ROPE_PHASE:
             longest *= 0.5
-        return Timing(self._segments, segment, max(1, math.ceil(segment / (self._max_inner_step or longest) - 1e-9)))
+        return Timing(self._segments, segment, max(1, math.ceil(segment / longest - 1e-9)))
 
     def _line(self, scenario: Scenario) -> int:
         """Line of a scenario's frame in the tables, which it is added to when new."""

@@ -133,6 +133,51 @@ def test_state_goes_to_another_environment():
         np.testing.assert_array_equal(one[4]["foot_reactions"], two[4]["foot_reactions"])
 
 
+class Table:
+    """The paper's motion, recorded."""
+
+    def __init__(self, phase: float) -> None:
+        self.phase = phase
+
+    def table(self, period: float) -> np.ndarray:
+        return (
+            HarmonicMotion.paper()
+            .components()
+            .at(period * np.arange(200) + self.phase)
+            .transpose(1, 0, 2)
+            .reshape(-1, 18)
+        )
+
+
+def test_recorded_motion_is_that_of_its_components():
+    runs = []
+    for motion in (HarmonicMotion.paper(), Table(0.0)):
+        env = gymnasium.make("AFrameHeave-v0", scenario=Scenario.paper(motion=motion), **MESH)
+        env.reset(seed=0)
+        runs.append([env.step(STILL)[4]["load_position"] for _ in range(50)])
+    np.testing.assert_allclose(runs[0], runs[1], rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("mesh", [{}, MESH])
+def test_state_takes_its_record_along(mesh):
+    env, other = (gymnasium.make("AFrameHeave-v0", **mesh).unwrapped for _ in range(2))
+    other.reset(seed=0, options={"scenario": Scenario.paper(motion=Table(2.0))})
+    env.reset(seed=0, options={"scenario": Scenario.paper(motion=Table(0.0))})
+    other.set_state(env.get_state())
+    for _ in range(10):
+        np.testing.assert_array_equal(env.step(STILL)[0], other.step(STILL)[0])
+
+
+def test_state_of_another_model_is_refused():
+    env = gymnasium.make("AFrameHeave-v0", **MESH).unwrapped
+    env.reset(seed=0)
+    for arguments in ({}, {"model": "rfem", "rfes": (5, 4)}, {**MESH, "rfem_modes": 5}):
+        other = gymnasium.make("AFrameHeave-v0", **arguments).unwrapped
+        other.reset(seed=0)
+        with pytest.raises(InvalidValue, match="another model"):
+            other.set_state(env.get_state())
+
+
 def test_last_information_of_rows_that_are_reset():
     vector = gymnasium.make_vec(
         "AFrameHeave-v0",
