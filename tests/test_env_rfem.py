@@ -18,17 +18,20 @@ from aframe_env.dynamics.rfem.chain import Division
 from aframe_env.dynamics.rfem.model import frame_model
 from aframe_env.dynamics.rfem.statics import LoadCase
 from aframe_env.motion import HarmonicMotion
-from aframe_env.section import Material
+from aframe_env.section import Material, Servomotor, reference_leg_section
 
 STILL = np.zeros(1, dtype=np.float32)
 MESH = {"model": "rfem", "rfes": (5, 2)}
 FRAME_KEYS = ("pulley_deflection", "foot_reactions", "servomotor_tensions", "utilisation")
 
 
-def stiffer(factor: float) -> Crane:
+def crane_with(**changes) -> Crane:
     frame = Crane().frame
-    material = Material(young_modulus=2.1e11 * factor, shear_modulus=8.1e10 * factor)
-    return Crane(frame=replace(frame, structure=replace(frame.structure, material=material)))
+    return Crane(frame=replace(frame, structure=replace(frame.structure, **changes)))
+
+
+def stiffer(factor: float) -> Crane:
+    return crane_with(material=Material(young_modulus=2.1e11 * factor, shear_modulus=8.1e10 * factor))
 
 
 @pytest.mark.parametrize("arguments", [{}, {"rfem_modes": 6, "observation": "sensors"}])
@@ -92,11 +95,13 @@ def test_rows_may_have_different_cranes_and_ropes():
         Scenario.paper(initial="rest"),
         Scenario.paper(initial="rest", crane=stiffer(3.0)),
         Scenario.paper(initial="rest", target_level=-20.0, load_mass=3e3),
+        Scenario.paper(initial="rest", crane=crane_with(servomotor=Servomotor(stiffness=3e8, damping=1e5))),
+        Scenario.paper(initial="rest", crane=crane_with(material=Material(tangential_damping=1e8))),
     ]
-    vector = gymnasium.make_vec("AFrameHeave-v0", num_envs=3, vectorization_mode="vector_entry_point", **MESH)
+    vector = gymnasium.make_vec("AFrameHeave-v0", num_envs=5, vectorization_mode="vector_entry_point", **MESH)
     vector.reset(seed=0, options={"scenario": scenarios})
     for _ in range(5):
-        rows = vector.step(np.full((3, 1), 0.5, dtype=np.float32))
+        rows = vector.step(np.full((5, 1), 0.5, dtype=np.float32))
     for k, scenario in enumerate(scenarios):
         scalar = gymnasium.make("AFrameHeave-v0", **MESH)
         scalar.reset(seed=k, options={"scenario": scenario})
@@ -104,6 +109,14 @@ def test_rows_may_have_different_cranes_and_ropes():
             row = scalar.step(np.full(1, 0.5, dtype=np.float32))
         np.testing.assert_array_equal(rows[0][k], row[0])
         np.testing.assert_array_equal(rows[4]["foot_reactions"][k], row[4]["foot_reactions"])
+
+
+def test_a_section_without_stress_points_has_no_utilisation():
+    legs = replace(reference_leg_section(), stress_points=())
+    env = gymnasium.make("AFrameHeave-v0", scenario=Scenario.paper(crane=crane_with(leg_section=legs)), **MESH)
+    _, info = env.reset(seed=0)
+    assert np.isnan(info["utilisation"])
+    assert np.isfinite(info["foot_reactions"]).all()
 
 
 @pytest.mark.parametrize("clone", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
