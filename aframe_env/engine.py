@@ -82,8 +82,7 @@ class Engine:
         self._known_records: dict[TabledMotion, tuple[int, int]] = {}
         # Lanes beyond the last row hold the paper's case, so that no lane computes with zeros for parameters.
         idle = self.row_vector(Scenario.paper())
-        view = self._view
-        view[...] = idle[None, :, None]
+        self._fill(idle)
 
     @property
     def _view(self) -> FloatArray:
@@ -118,7 +117,7 @@ class Engine:
             column[:full] = commands[: full * self._lanes].reshape(full, self._lanes)
             if rest:
                 column[full, :rest] = commands[full * self._lanes :]
-        self._step(self._blocks, self._components, self._segments, self._records)
+        self._advance()
 
     def reset_row(self, index: int, scenario: Scenario) -> None:
         """Put a row at the start of a scenario."""
@@ -131,28 +130,18 @@ class Engine:
         view[block, : len(vector), lane] = vector
         view[block, len(vector) :, lane] = 0.0
 
+    def restore_row(self, index: int, vector: FloatArray, scenario: Scenario) -> None:
+        """Put back a row of ``scenario`` that ``copy_row`` of this or a like engine gave."""
+        self.write_row(index, self._adopt(vector, scenario))
+
     def copy_row(self, index: int) -> FloatArray:
         """Return everything the engine knows of a row: (slots,)."""
         block, lane = divmod(index, self._lanes)
         return self._view[block, :, lane].copy()
 
-    def restore_row(self, index: int, vector: FloatArray, scenario: Scenario) -> None:
-        """Put back a row of ``scenario`` that ``copy_row`` of this engine, or of another, returned."""
-        times = timing(scenario, self.control_period, self._max_inner_step)
-        if vector[at.CONTROL_PERIOD] != times.segment or vector[at.SUBSTEPS] != times.substeps:
-            raise InvalidValue(
-                f"set_state(): the state belongs to an environment with {vector[at.SUBSTEPS]:g} inner steps in "
-                f"{vector[at.CONTROL_PERIOD]:g} s: must be {times.substeps} in {times.segment:g} s, as here"
-            )
-        self._make_room((len(vector) - at.ROW_SLOTS) // at.COMPONENT_SLOTS)
-        vector = vector.copy()
-        if isinstance(scenario.motion, TabledMotion):
-            vector[at.RECORD], vector[at.RECORD_LENGTH] = self._record(scenario.motion, times.segment)
-        self.write_row(index, vector)
-
     def row_vector(self, scenario: Scenario) -> FloatArray:
         """Slots of a row at the start of a scenario: (slots,)."""
-        times = timing(scenario, self.control_period, self._max_inner_step)
+        times = self._timing(scenario)
         motion: ShipMotion = scenario.motion
         if isinstance(motion, ComponentMotion):
             components = motion.components()
@@ -169,6 +158,30 @@ class Engine:
         _place_load(row, scenario)
         self._kernels_of_one.start(row[None], self._components, self._records)
         return row
+
+    def _fill(self, vector: FloatArray) -> None:
+        """Put every lane where ``vector`` (slots,) says."""
+        self._view[...] = vector[None, :, None]
+
+    def _advance(self) -> None:
+        self._step(self._blocks, self._components, self._segments, self._records)
+
+    def _timing(self, scenario: Scenario) -> Timing:
+        return timing(scenario, self.control_period, self._max_inner_step)
+
+    def _adopt(self, vector: FloatArray, scenario: Scenario) -> FloatArray:
+        """Make room for a row of another engine, and point it at this engine's tables: (slots,)."""
+        times = self._timing(scenario)
+        if vector[at.CONTROL_PERIOD] != times.segment or vector[at.SUBSTEPS] != times.substeps:
+            raise InvalidValue(
+                f"set_state(): the state belongs to an environment with {vector[at.SUBSTEPS]:g} inner steps in "
+                f"{vector[at.CONTROL_PERIOD]:g} s: must be {times.substeps} in {times.segment:g} s, as here"
+            )
+        self._make_room((len(vector) - at.ROW_SLOTS) // at.COMPONENT_SLOTS)
+        adopted = vector.copy()
+        if not isinstance(scenario.motion, ComponentMotion):
+            adopted[at.RECORD], adopted[at.RECORD_LENGTH] = self._record(scenario.motion, times.segment)
+        return adopted
 
     @property
     def _kernels_of_one(self):  # type: ignore[no-untyped-def]

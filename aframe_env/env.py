@@ -37,7 +37,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     A load of 20 to 100 t hangs on an elastic rope from an A-frame at the stern of a ship in a random sea. The drum
     pays rope out and in. The load shall stay at its required level h. The model is the simplified one of
     Adamiec-Wójcik, Fałat, Maczyński and Wojciech (2009), eqs. (37)-(41): rigid frame, six-degree-of-freedom ship
-    motion, the load a particle on a rope that is elastic, damped and cannot push.
+    motion, the load a particle on a rope that is elastic, damped and cannot push; or, with `model="rfem"`, their full
+    one, eqs. (1)-(30), with the frame a chain of rigid finite elements.
 
     Axes: x outboard (aft), z up, y to the left of somebody who looks outboard; origin at the mean place of the deck
     frame, midway between the frame's feet. SI units, angles in radians.
@@ -98,10 +99,18 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     `time` [s], `load_position` (3,) [m], `rope_tension` [N], `slack` (the rope was slack within the last step),
     `omega1` [m² s] and `omega2` [m] so far, eqs. (31), (32).
 
+    With `model="rfem"` also, vectors along the deck's axes: `pulley_deflection` (3,) [m] of S on the frame;
+    `foot_reactions` (2, 3) [N], forces on the frame at A_R and A_L; `servomotor_tensions` (2,) [N] of S_R and S_L;
+    `utilisation`, the largest von Mises stress between two rfes over the yield strength. The pulley of the
+    observation is the one of the rigid frame in both models: it is what a motion reference unit on the deck tells.
+
     ## Arguments
     All by keyword, as in `gymnasium.make("AFrameHeave-v0", control_period=0.2)`:
 
-    - `model`: "simplified".
+    - `model`: "simplified" or "rfem".
+    - `rfes`: with "rfem", elements of a leg and of the top beam (default `(10, 8)`; the beam's even).
+    - `rfem_modes`: with "rfem", how many natural modes to keep beside nine static shapes; None (default): all. With 5
+      the load moves as with all to 1e-9, reactions to 1e-3 of their range, in seas that build up over some seconds.
     - `scenario`: a `Scenario` for every episode, or the `ScenarioDistribution` to draw from. Default: Hs 0.5-4 m,
       Tp 6-14 s, any heading, load 20-100 t, rope 50-1500 m.
     - `control_period`: 0.001 to 2 s (default 0.1).
@@ -128,6 +137,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
         episode_duration: float = 60.0,
         observation: task.Observation = "state",
         max_inner_step: float | None = None,
+        rfes: tuple[int, int] | None = None,
+        rfem_modes: int | None = None,
         render_mode: str | None = None,
     ) -> None:
         if render_mode is not None:
@@ -140,6 +151,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
             episode_duration=episode_duration,
             observation=observation,
             max_inner_step=max_inner_step,
+            rfes=rfes,
+            rfem_modes=rfem_modes,
         )
         self.observation_space = self._simulation.observation_space  # type: ignore[assignment]
         self.action_space = self._simulation.action_space
@@ -246,9 +259,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
             self._renderer = open_renderer(self._simulation)
         return self._renderer
 
-    @staticmethod
-    def _info(results: list[float]) -> dict[str, Any]:
-        return {
+    def _info(self, results: list[float]) -> dict[str, Any]:
+        info = {
             "time": results[task.TIME],
             "load_position": np.array(results[task.LOAD : task.LOAD + 3]),
             "rope_tension": results[task.TENSION],
@@ -256,6 +268,10 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
             "omega1": results[task.OMEGA1],
             "omega2": results[task.OMEGA2],
         }
+        frames = self._simulation.frames()
+        if frames is not None:
+            info |= {key: value[0] for key, value in task.frame_info(frames).items()}
+        return info
 
 
 def _scenario_option(options: dict[str, Any] | None) -> Any:

@@ -44,6 +44,8 @@ class Material:
     """η of normal strain, Pa s (paper's (2), (6), (7))."""
     tangential_damping: float = 0.0
     """η of shear strain, Pa s (paper's (3)–(5))."""
+    yield_strength: float = 3.55e8
+    """R_e, Pa, which the utilisation of a stress refers to; the default is that of S355."""
 
     def __post_init__(self) -> None:
         require_number("young_modulus", self.young_modulus, "Pa", low=0.0, low_open=True)
@@ -51,6 +53,7 @@ class Material:
         require_number("density", self.density, "kg/m³", low=0.0, low_open=True)
         require_number("normal_damping", self.normal_damping, "Pa s", low=0.0)
         require_number("tangential_damping", self.tangential_damping, "Pa s", low=0.0)
+        require_number("yield_strength", self.yield_strength, "Pa", low=0.0, low_open=True)
 
 
 @dataclass(frozen=True, kw_only=True)

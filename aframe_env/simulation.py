@@ -13,6 +13,7 @@ from gymnasium import spaces
 from aframe_env import task
 from aframe_env.dynamics import layout as at
 from aframe_env.engine import Engine
+from aframe_env.flexible_engine import FlexibleEngine, Mesh, mesh_of
 from aframe_env.motion import require_coverage
 from aframe_env.scenario import Scenario, ScenarioDistribution, ScenarioSource
 from aframe_env.sensors import SensorBank, Sensors
@@ -20,7 +21,7 @@ from aframe_env.validation import InvalidValue, require_choice, require_number
 
 FloatArray = npt.NDArray[np.float64]
 
-MODELS = ("simplified",)
+MODELS = ("simplified", "rfem")
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,8 @@ class RowState:
     engine: FloatArray
     sensors: tuple[FloatArray, FloatArray, FloatArray, int, int] | None
     step: int
+    mesh: Mesh | None = None
+    """Of the full model; None for the simplified one."""
 
 
 class Simulation:
@@ -46,6 +49,8 @@ class Simulation:
         episode_duration: float = 60.0,
         observation: task.Observation = "state",
         max_inner_step: float | None = None,
+        rfes: tuple[int, int] | None = None,
+        rfem_modes: int | None = None,
     ) -> None:
         """Validate the arguments of the environments (see ``AFrameHeaveEnv``) and make room for the rows."""
         require_choice("model", model, MODELS)
@@ -60,7 +65,11 @@ class Simulation:
         self.control_period = float(control_period)
         self.episode_steps = max(1, math.ceil(episode_duration / control_period - 1e-9))
         self.episode_duration = self.episode_steps * self.control_period
-        self._engine = Engine(rows, control_period, max_inner_step=max_inner_step)
+        self._mesh = mesh_of(model, rfes, rfem_modes)
+        if self._mesh is None:
+            self._engine = Engine(rows, control_period, max_inner_step=max_inner_step)
+        else:
+            self._engine = FlexibleEngine(rows, control_period, self._mesh, max_inner_step=max_inner_step)
         self._report = task.report_kernel(self._engine.lanes)
         sensors = Sensors() if observation == "sensors" else observation
         self._bank = SensorBank(sensors, rows, control_period) if isinstance(sensors, Sensors) else None
@@ -81,6 +90,10 @@ class Simulation:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._report = task.report_kernel(self._engine.lanes)
+
+    def frames(self) -> FloatArray | None:
+        """Readout of the rows' frames, (rows, READOUTS); None for the simplified model."""
+        return self._engine.read_frames() if isinstance(self._engine, FlexibleEngine) else None
 
     @property
     def engine(self) -> Engine:
@@ -131,12 +144,16 @@ class Simulation:
         if scenario is None:
             raise InvalidValue("get_state() before the first reset()")
         sensors = None if self._bank is None else self._bank.copy_row(index)
-        return RowState(scenario, self._engine.copy_row(index), sensors, int(self.steps[index]))
+        return RowState(scenario, self._engine.copy_row(index), sensors, int(self.steps[index]), self._mesh)
 
     def write_row(self, index: int, state: RowState) -> None:
         """Put back what ``copy_row`` returned."""
         if (state.sensors is None) != (self._bank is None):
             raise InvalidValue("set_state(): the state belongs to an environment with another observation")
+        if state.mesh != self._mesh:
+            raise InvalidValue(
+                "set_state(): the state belongs to an environment with another model, rfes or rfem_modes"
+            )
         self._engine.restore_row(index, state.engine, state.scenario)
         self.scenarios[index] = state.scenario
         self.steps[index] = state.step

@@ -14,6 +14,7 @@ from gymnasium import spaces
 
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.compiling import kernel, scalar, source_digest
+from aframe_env.dynamics.flexible import readout
 from aframe_env.sensors import CHANNELS, Sensors
 
 Observation = Literal["state", "sensors"] | Sensors
@@ -171,6 +172,16 @@ def report_kernel(lanes: int) -> Callable[..., None]:
             results[i, PARTED] = row[at.PARTED * lanes + j]
 
     return report
+
+
+def frame_info(frames: npt.NDArray[np.float64]) -> dict[str, Any]:
+    """What the information of an environment says of the frames, from their readout (rows, READOUTS)."""
+    return {
+        "pulley_deflection": frames[:, readout.DEFLECTION : readout.DEFLECTION + 3],
+        "foot_reactions": frames[:, readout.FEET : readout.FEET + 6].reshape(-1, 2, 3),
+        "servomotor_tensions": frames[:, readout.SERVOMOTORS : readout.SERVOMOTORS + 2],
+        "utilisation": frames[:, readout.UTILISATION],
+    }
 
 
 def sensed_truth(state: npt.NDArray[np.float64], angles: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

@@ -50,6 +50,8 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         episode_duration: float = 60.0,
         observation: task.Observation = "state",
         max_inner_step: float | None = None,
+        rfes: tuple[int, int] | None = None,
+        rfem_modes: int | None = None,
         max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
@@ -75,6 +77,8 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
             episode_duration=episode_duration,
             observation=observation,
             max_inner_step=max_inner_step,
+            rfes=rfes,
+            rfem_modes=rfem_modes,
         )
         self.single_observation_space = self._simulation.observation_space
         self.single_action_space = self._simulation.action_space
@@ -267,6 +271,9 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
             "omega1": results[:, task.OMEGA1].copy(),
             "omega2": results[:, task.OMEGA2].copy(),
         }
+        frames = self._simulation.frames()
+        if frames is not None:
+            values |= task.frame_info(frames)
         present = mask.copy()
         return values | {f"_{key}": present for key in values}
 

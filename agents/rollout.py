@@ -54,13 +54,20 @@ def run(
     observation: task.Observation = "state",
     control_period: float = 0.1,
     episode_duration: float = 60.0,
+    model: str = "simplified",
+    rfem_modes: int | None = None,
     noise_seed: int = 0,
     progress: Callable[[int], object] | None = None,
 ) -> Episodes:
-    """Run ``policy`` through every scenario. ``noise_seed`` draws the sensors' noise, the same for every policy."""
+    """Run ``policy`` through every scenario, on either model (see ``AFrameHeaveEnv``).
+
+    ``noise_seed`` draws the sensors' noise, the same for every policy.
+    """
     rows = len(scenarios)
     simulation = Simulation(
         rows,
+        model=model,
+        rfem_modes=rfem_modes,
         scenario=scenarios[0],
         observation=observation,
         control_period=control_period,

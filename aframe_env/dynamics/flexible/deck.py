@@ -1,0 +1,167 @@
+"""The moving deck as the frame feels it: pose, spin, and the field of acceleration along its own axes."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from aframe_env.dynamics import layout as at
+from aframe_env.dynamics.compiling import scalar
+from aframe_env.dynamics.flexible import layout as flex
+from aframe_env.dynamics.motion import advance_motion, on_quintic, quintic
+from aframe_env.dynamics.transforms import sine_cosine
+
+Block = npt.NDArray[np.float64]
+
+
+@scalar
+def turn(
+    roll: float, pitch: float, yaw: float, p: float, q: float, r: float, pp: float, qq: float, rr: float
+) -> tuple[
+    tuple[float, float, float, float, float, float, float, float, float],
+    tuple[float, float, float],
+    tuple[float, float, float],
+]:
+    """Rotation {D} → base, eq. (38), row-major; angular velocity and acceleration along {D}; from the angles
+    [rad], their rates (p, q, r) and accelerations (pp, qq, rr)."""
+    sr, cr = sine_cosine(roll)
+    sp, cp = sine_cosine(pitch)
+    sy, cy = sine_cosine(yaw)
+    rotation = (
+        cy * cp,
+        cy * sp * sr - sy * cr,
+        cy * sp * cr + sy * sr,
+        sy * cp,
+        sy * sp * sr + cy * cr,
+        sy * sp * cr - cy * sr,
+        -sp,
+        cp * sr,
+        cp * cr,
+    )
+    spin = (p - r * sp, q * cr + r * cp * sr, -q * sr + r * cp * cr)
+    spin_up = (
+        pp - rr * sp - r * cp * q,
+        qq * cr - q * sr * p + rr * cp * sr - r * sp * q * sr + r * cp * cr * p,
+        -qq * sr - q * cr * p + rr * cp * cr - r * sp * q * cr - r * cp * sr * p,
+    )
+    return rotation, spin, spin_up
+
+
+@scalar
+def bend(c2: float, c3: float, c4: float, c5: float, t: float) -> float:
+    """Second derivative of a quintic."""
+    return 2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5))
+
+
+@scalar
+def advance_deck(row: Block, frame: Block, components: int, records: Block, lanes: int) -> None:
+    """Advance the deck by one segment, and lay quintics through its six coordinates over it."""
+    for i in range(18):
+        for j in range(lanes):
+            frame[(flex.BEFORE + i) * lanes + j] = row[(at.MOTION + i) * lanes + j]
+    advance_motion(row, components, records, lanes)
+    for dof in range(6):
+        for j in range(lanes):
+            coefficients = quintic(
+                frame[(flex.BEFORE + dof) * lanes + j],
+                frame[(flex.BEFORE + 6 + dof) * lanes + j],
+                frame[(flex.BEFORE + 12 + dof) * lanes + j],
+                row[(at.MOTION + dof) * lanes + j],
+                row[(at.MOTION + 6 + dof) * lanes + j],
+                row[(at.MOTION + 12 + dof) * lanes + j],
+                row[at.CONTROL_PERIOD * lanes + j],
+            )
+            for k in range(6):
+                frame[(flex.COORDINATES + 6 * dof + k) * lanes + j] = coefficients[k]
+
+
+@scalar
+def coordinate_at(frame: Block, dof: int, elapsed: float, lanes: int, j: int) -> tuple[float, float, float]:
+    """Coordinate ``dof`` of the deck, its rate and acceleration, ``elapsed`` s into the segment."""
+    c = flex.COORDINATES + 6 * dof
+    c2, c3 = frame[(c + 2) * lanes + j], frame[(c + 3) * lanes + j]
+    c4, c5 = frame[(c + 4) * lanes + j], frame[(c + 5) * lanes + j]
+    place, rate = on_quintic(frame[c * lanes + j], frame[(c + 1) * lanes + j], c2, c3, c4, c5, elapsed)
+    return place, rate, bend(c2, c3, c4, c5, elapsed)
+
+
+@scalar
+def write_pose(
+    row: Block,
+    frame: Block,
+    lanes: int,
+    j: int,
+    surge: tuple[float, float, float],
+    sway: tuple[float, float, float],
+    heave: tuple[float, float, float],
+    roll: tuple[float, float, float],
+    pitch: tuple[float, float, float],
+    yaw: tuple[float, float, float],
+) -> None:
+    """Write lane j's pose and INPUT, from the deck's coordinates (each with its rate and acceleration)."""
+    turned, spin, spin_up = turn(roll[0], pitch[0], yaw[0], roll[1], pitch[1], yaw[1], roll[2], pitch[2], yaw[2])
+    for k in range(9):
+        frame[(flex.ROTATION + k) * lanes + j] = turned[k]
+    frame[flex.ORIGIN * lanes + j] = surge[0]
+    frame[(flex.ORIGIN + 1) * lanes + j] = sway[0]
+    frame[(flex.ORIGIN + 2) * lanes + j] = heave[0]
+    frame[(flex.ORIGIN + 3) * lanes + j] = surge[1]
+    frame[(flex.ORIGIN + 4) * lanes + j] = sway[1]
+    frame[(flex.ORIGIN + 5) * lanes + j] = heave[1]
+    x, y, z = spin
+    a, b, c = spin_up
+    frame[flex.SPIN * lanes + j] = x
+    frame[(flex.SPIN + 1) * lanes + j] = y
+    frame[(flex.SPIN + 2) * lanes + j] = z
+    fx, fy, fz = -surge[2], -sway[2], -row[at.GRAVITY * lanes + j] - heave[2]
+    for k in range(3):
+        frame[(flex.INPUT + k) * lanes + j] = turned[k] * fx + turned[3 + k] * fy + turned[6 + k] * fz
+    frame[(flex.INPUT + 3) * lanes + j] = -y * y - z * z
+    frame[(flex.INPUT + 4) * lanes + j] = x * y - c
+    frame[(flex.INPUT + 5) * lanes + j] = x * z + b
+    frame[(flex.INPUT + 6) * lanes + j] = x * y + c
+    frame[(flex.INPUT + 7) * lanes + j] = -x * x - z * z
+    frame[(flex.INPUT + 8) * lanes + j] = y * z - a
+    frame[(flex.INPUT + 9) * lanes + j] = x * z - b
+    frame[(flex.INPUT + 10) * lanes + j] = y * z + a
+    frame[(flex.INPUT + 11) * lanes + j] = -x * x - y * y
+
+
+@scalar
+def deck_at(row: Block, frame: Block, index: int, lanes: int) -> None:
+    """Pose at the end of inner step ``index`` of the segment; lanes that have fewer stay at their segment's end."""
+    for j in range(lanes):
+        duration, substeps = row[at.CONTROL_PERIOD * lanes + j], row[at.SUBSTEPS * lanes + j]
+        done = index + 1.0
+        elapsed = duration * (done if done < substeps else substeps) / substeps
+        write_pose(
+            row,
+            frame,
+            lanes,
+            j,
+            coordinate_at(frame, 0, elapsed, lanes, j),
+            coordinate_at(frame, 1, elapsed, lanes, j),
+            coordinate_at(frame, 2, elapsed, lanes, j),
+            coordinate_at(frame, 3, elapsed, lanes, j),
+            coordinate_at(frame, 4, elapsed, lanes, j),
+            coordinate_at(frame, 5, elapsed, lanes, j),
+        )
+
+
+@scalar
+def deck_now(row: Block, frame: Block, lanes: int) -> None:
+    """Pose from the deck's coordinates as they are in the row."""
+    for j in range(lanes):
+        m = at.MOTION
+        write_pose(
+            row,
+            frame,
+            lanes,
+            j,
+            (row[m * lanes + j], row[(m + 6) * lanes + j], row[(m + 12) * lanes + j]),
+            (row[(m + 1) * lanes + j], row[(m + 7) * lanes + j], row[(m + 13) * lanes + j]),
+            (row[(m + 2) * lanes + j], row[(m + 8) * lanes + j], row[(m + 14) * lanes + j]),
+            (row[(m + 3) * lanes + j], row[(m + 9) * lanes + j], row[(m + 15) * lanes + j]),
+            (row[(m + 4) * lanes + j], row[(m + 10) * lanes + j], row[(m + 16) * lanes + j]),
+            (row[(m + 5) * lanes + j], row[(m + 11) * lanes + j], row[(m + 17) * lanes + j]),
+        )

@@ -1,0 +1,174 @@
+"""What a frame's present state means: deflection of S, reactions, servomotor forces, utilisation of its material.
+
+Reactions are R = Pᵀ(K q + L q̇ - f), linear in the modes and in what acts on the frame, see
+``aframe_env.dynamics.rfem.constraints``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, lru_cache
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from numba import prange
+
+from aframe_env.crane import Frame
+from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar, source_digest
+from aframe_env.dynamics.flexible import layout as flex
+from aframe_env.dynamics.flexible.blocks import nine
+from aframe_env.dynamics.flexible.reduction import ModalFrame, modal_frame
+from aframe_env.dynamics.rfem.chain import Division
+from aframe_env.dynamics.rfem.model import FrameModel
+
+Array = npt.NDArray[np.float64]
+
+# Columns of a readout.
+DEFLECTION: Final = 0
+"""Of S, along {D}, 3, m."""
+FEET: Final = 3
+"""Forces on the frame at A_R and A_L, along {D}, 6, N."""
+SERVOMOTORS: Final = 9
+"""Tensions of S_R and S_L, 2, N."""
+UTILISATION: Final = 11
+"""Largest von Mises stress at an sde over the yield strength; NaN for sections without stress points."""
+READOUTS: Final = 12
+
+# Head of a line of the readout's table.
+COUNT, CARRIED_COUNT, SPRINGS, POINTS, DAMPED, HEAD = 0, 1, 2, 3, 4, 5
+FORCES: Final = 11
+"""Numbers that are linear in the state: columns up to UTILISATION."""
+
+
+def _forces(model: FrameModel, residual: Array, position: Array, velocity: Array) -> Array:
+    """Feet and servomotors, (k, 8), of K q + L q̇ - f, q and q̇, each (k, n)."""
+    reactions = model.reactions(residual)
+    feet = model.foot_reactions(reactions).reshape(-1, 6)
+    return np.hstack([feet, model.servomotor_tensions(position, velocity, reactions)])
+
+
+def _acting(model: FrameModel, forces: Array) -> Array:
+    """Columns of FORCES for generalised forces (n, k) on the frame, (k, FORCES)."""
+    none = np.zeros(forces.T.shape)
+    return np.hstack([np.zeros((forces.shape[1], 3)), _forces(model, -forces.T, none, none)])
+
+
+def _points(modal: ModalFrame) -> Array:
+    """Share of the yield strength by unit N, M2, M3 (normal) and V2, V3, T (shear), (n_sde, points, 6)."""
+    springs = modal.model.structure.springs
+    sections = [spring.member.section_at(spring.position) for spring in springs]
+    result = np.zeros((len(springs), max(len(section.stress_points) for section in sections) or 1, 6))
+    for index, (spring, section) in enumerate(zip(springs, sections, strict=True)):
+        if not section.stress_points:
+            result[index] = np.nan
+        for number, point in enumerate(section.stress_points):
+            result[index, number] = (
+                1.0 / section.area,
+                point.offset_3 / section.second_moment_2,
+                point.offset_2 / section.second_moment_3,
+                point.shear_2,
+                point.shear_3,
+                point.torsion,
+            )
+        result[index] /= spring.member.material.yield_strength
+    return result
+
+
+@lru_cache(maxsize=8)
+def readout_table(frame: Frame, division: Division, modes: int | None) -> Array:
+    """Line of the readout's table for a frame, (size,)."""
+    modal = modal_frame(frame, division, modes)
+    model, shape = modal.model, modal.shape
+    none = np.zeros(shape.T.shape)
+    size = shape.shape[0]
+    by_position = np.hstack([(modal.pulley @ shape).T, _forces(model, shape.T @ model.stiffness, shape.T, none)])
+    by_rate = np.hstack([np.zeros((modal.count, 3)), _forces(model, shape.T @ model.damping, none, shape.T)])
+    strain = (model.deformation @ shape).T
+    points = _points(modal)
+    damping = model.structure.damping()
+    head = [modal.count, modal.carried_count, points.shape[0], points.shape[1], bool(damping.any())]
+    parts = [
+        by_position,
+        by_rate,
+        _acting(model, np.hstack([modal.uniform, -modal.turning.reshape(size, 9)])),
+        _acting(model, -modal.carried.reshape(size, -1)),
+        _acting(model, modal.pulley.T),
+        strain * model.structure.stiffness(),
+        strain * damping,
+        points,
+    ]
+    return np.concatenate([np.array(head, dtype=np.float64), *(part.ravel() for part in parts)])
+
+
+@scalar
+def add_line(sums: Array, table: Array, first: int, size: int, factor: float) -> None:
+    """Add ``factor`` times ``size`` numbers of the table from ``first``."""
+    line = table[first : first + size]
+    for k in range(size):
+        sums[k] += factor * line[k]
+
+
+@scalar
+def read_frame(frame: Array, table: Array, stresses: Array, result: Array, lanes: int, j: int) -> None:
+    """Readout of lane j into ``result`` (READOUTS,); ``stresses`` (6 n_sde,) is scratch."""
+    modes, carried, springs = int(table[COUNT]), int(table[CARRIED_COUNT]), int(table[SPRINGS])
+    points = int(table[POINTS])
+    forces = result[:FORCES]
+    result[:] = 0.0
+    stresses[:] = 0.0
+    acting = HEAD + 2 * FORCES * modes
+    strains = acting + FORCES * (12 + 9 * carried + 3)
+    shares = strains + 12 * springs * modes
+    for i in range(modes):
+        mode = (flex.MODES + flex.MODE_SLOTS * i) * lanes + j
+        place, rate = frame[mode + flex.POSITION * lanes], frame[mode + flex.RATE * lanes]
+        add_line(forces, table, HEAD + FORCES * i, FORCES, place)
+        add_line(forces, table, HEAD + FORCES * (modes + i), FORCES, rate)
+        add_line(stresses, table, strains + 6 * springs * i, 6 * springs, place)
+        if table[DAMPED] > 0.0:
+            add_line(stresses, table, strains + 6 * springs * (modes + i), 6 * springs, rate)
+        if i < carried:
+            spin = 2.0 * rate
+            x = spin * frame[flex.SPIN * lanes + j]
+            y = spin * frame[(flex.SPIN + 1) * lanes + j]
+            z = spin * frame[(flex.SPIN + 2) * lanes + j]
+            w = nine(frame, flex.INPUT + 3, lanes, j)
+            coriolis = (0.0, -z, y, z, 0.0, -x, -y, x, 0.0)
+            for k in range(9):
+                add_line(forces, table, acting + FORCES * (12 + 9 * i + k), FORCES, w[k] * place + coriolis[k])
+    for k in range(12):
+        add_line(forces, table, acting + FORCES * k, FORCES, frame[(flex.INPUT + k) * lanes + j])
+    for k in range(3):
+        add_line(forces, table, acting + FORCES * (12 + 9 * carried + k), FORCES, frame[(flex.PULL + k) * lanes + j])
+    worst = 0.0
+    for spring in range(springs):
+        n, v2, v3 = abs(stresses[6 * spring]), abs(stresses[6 * spring + 1]), abs(stresses[6 * spring + 2])
+        t, m2, m3 = abs(stresses[6 * spring + 3]), abs(stresses[6 * spring + 4]), abs(stresses[6 * spring + 5])
+        for point in range(points):
+            p = shares + 6 * (points * spring + point)
+            sigma = n * table[p] + m2 * table[p + 1] + m3 * table[p + 2]
+            tau = v2 * table[p + 3] + v3 * table[p + 4] + t * table[p + 5]
+            square = sigma * sigma + 3.0 * tau * tau
+            worst = square if square > worst or square != square else worst  # once NaN, always NaN
+    result[UTILISATION] = np.sqrt(worst)
+
+
+@cache
+def readout_kernel(lanes: int, parallel: bool) -> Callable[[Array, Array, Array], None]:
+    """Kernel (frames, tables, results (N, READOUTS)) that reads the rows' frames out."""
+    source: Any = source_digest()
+    compile_as = parallel_kernel if parallel else kernel
+    loop: Any = prange if parallel else range
+
+    @compile_as
+    def readout(frames: Array, tables: Array, results: Array) -> None:
+        source  # noqa: B018
+        for block in loop(frames.shape[0]):
+            sums = np.empty(6 * int(tables[0, SPRINGS]))
+            for j in range(lanes):
+                if block * lanes + j < results.shape[0]:
+                    line = int(frames[block, flex.FRAME * lanes + j])
+                    read_frame(frames[block], tables[line], sums, results[block * lanes + j], lanes, j)
+
+    return readout

@@ -1,0 +1,188 @@
+"""One control step of a block of rows of the full model: deck, winch, frame, rope, load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import prange
+
+from aframe_env.dynamics import layout as at
+from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar, source_digest
+from aframe_env.dynamics.flexible import layout as flex
+from aframe_env.dynamics.flexible.blocks import nine, three
+from aframe_env.dynamics.flexible.deck import advance_deck, deck_at
+from aframe_env.dynamics.flexible.frame import finish, predict
+from aframe_env.dynamics.flexible.rope import apply, apply_transposed, sweep, unit
+from aframe_env.dynamics.flexible.start import start_rows
+from aframe_env.dynamics.layout import LANES
+from aframe_env.dynamics.step import drum_at, plan_winch
+from aframe_env.dynamics.winch import next_error
+
+Array = npt.NDArray[np.float64]
+
+LOAD_BETA: Final = 1.0 / 12.0
+"""β of the load (Fox and Goodwin)."""
+
+
+@scalar
+def pull(row: Array, frame: Array, table: Array, index: int, lanes: int) -> None:
+    """Bring drum and load to the end of inner step ``index``, and find the rope's force there."""
+    h = table[flex.STEP]
+    give, give_rate = nine(table, flex.GIVE, 1, 0), nine(table, flex.GIVE_RATE, 1, 0)
+    late, half = LOAD_BETA * h * h, 0.5 * h
+    early = (0.5 - LOAD_BETA) * h * h
+    for j in range(lanes):
+        active = frame[flex.ACTIVE * lanes + j] > 0.0
+        first, decay = row[(at.WINCH + 3) * lanes + j], row[at.HALF_STEP_DECAY * lanes + j]
+        error0 = row[(at.WINCH + 4) * lanes + j]
+        error = next_error(next_error(error0, 2.0 * index + 1.0, first, decay), 2.0 * index + 2.0, first, decay)
+        angle, speed = drum_at(row, lanes, j, (index + 1.0) * h, error)
+        radius, mass = row[at.DRUM_RADIUS * lanes + j], row[at.MASS * lanes + j]
+        gravity, parted = row[at.GRAVITY * lanes + j], row[at.PARTED * lanes + j]
+        stiffness = row[at.AXIAL_STIFFNESS * lanes + j] * (1.0 - parted)
+        damping = row[at.ROPE_DAMPING * lanes + j] * (1.0 - parted)
+        length = row[at.FREE_LENGTH * lanes + j] + radius * angle
+
+        x1, x2, x3 = three(row, at.LOAD_POSITION, lanes, j)
+        v1, v2, v3 = three(row, at.LOAD_VELOCITY, lanes, j)
+        b1, b2, b3 = three(frame, flex.LOAD_ACCELERATION, lanes, j)
+        y1, y2, y3 = x1 + h * v1 + early * b1, x2 + h * v2 + early * b2, x3 + h * v3 + early * b3 - late * gravity
+        w1, w2, w3 = v1 + half * b1, v2 + half * b2, v3 + half * b3 - half * gravity
+        turned, spin = nine(frame, flex.ROTATION, lanes, j), three(frame, flex.SPIN, lanes, j)
+        o1, o2, o3 = three(frame, flex.ORIGIN, lanes, j)
+        q1, q2, q3 = three(frame, flex.ORIGIN + 3, lanes, j)
+        load = apply_transposed(turned, y1 - o1, y2 - o2, y3 - o3)
+        load_rate = apply_transposed(turned, w1 - q1, w2 - q2, w3 - q3)
+        p1, p2, p3 = three(row, at.PULLEY_ON_DECK, lanes, j)
+        t1, t2, t3 = three(frame, flex.TIP, lanes, j)
+        pulley, pulley_rate = (p1 + t1, p2 + t2, p3 + t3), three(frame, flex.TIP + 3, lanes, j)
+        drum = three(frame, flex.DRUM, lanes, j)
+        _, l1, l2, l3 = unit(load[0] - pulley[0], load[1] - pulley[1], load[2] - pulley[2])
+        _, d1, d2, d3 = unit(drum[0] - pulley[0], drum[1] - pulley[1], drum[2] - pulley[2])
+        force, to_load, to_drum = row[at.TENSION * lanes + j], (l1, l2, l3), (d1, d2, d3)
+        constants = (pulley, pulley_rate, load, load_rate, drum, spin, give, give_rate, late / mass, half / mass)
+        rope = (length, radius * speed, stiffness, damping)
+        force, to_load, to_drum = sweep(force, to_load, to_drum, *constants, *rope)
+        force, to_load, to_drum = sweep(force, to_load, to_drum, *constants, *rope)
+        force, to_load, to_drum = sweep(force, to_load, to_drum, *constants, *rope)
+
+        n1, n2, n3 = apply(turned, to_load[0], to_load[1], to_load[2])
+        share = -force / mass
+        n1, n2, n3 = share * n1, share * n2, share * n3
+        z1, z2, z3 = y1 + late * n1, y2 + late * n2, y3 + late * n3
+        u1, u2, u3 = w1 + half * n1, w2 + half * n2, w3 + half * n3
+        row[at.LOAD_POSITION * lanes + j] = z1 if active else x1
+        row[(at.LOAD_POSITION + 1) * lanes + j] = z2 if active else x2
+        row[(at.LOAD_POSITION + 2) * lanes + j] = z3 if active else x3
+        row[at.LOAD_VELOCITY * lanes + j] = u1 if active else v1
+        row[(at.LOAD_VELOCITY + 1) * lanes + j] = u2 if active else v2
+        row[(at.LOAD_VELOCITY + 2) * lanes + j] = u3 if active else v3
+        frame[flex.LOAD_ACCELERATION * lanes + j] = n1 if active else b1
+        frame[(flex.LOAD_ACCELERATION + 1) * lanes + j] = n2 if active else b2
+        frame[(flex.LOAD_ACCELERATION + 2) * lanes + j] = n3 - gravity if active else b3
+        for k in range(3):
+            before = frame[(flex.PULL + k) * lanes + j]
+            frame[(flex.PULL + k) * lanes + j] = force * (to_load[k] + to_drum[k]) if active else before
+        row[at.DRUM_ANGLE * lanes + j] = angle if active else row[at.DRUM_ANGLE * lanes + j]
+        row[at.DRUM_SPEED * lanes + j] = speed if active else row[at.DRUM_SPEED * lanes + j]
+        row[(at.WINCH + 4) * lanes + j] = error if active else error0
+        row[at.TENSION * lanes + j] = force if active else row[at.TENSION * lanes + j]
+        charge(row, x3, v3, z3, u3, h if active else 0.0, lanes, j)
+
+
+@scalar
+def charge(row: Array, z0: float, v0: float, z1: float, v1: float, h: float, lanes: int, j: int) -> None:
+    """Add an inner step of length h [s] to Ω1, Ω2 and the rope's peak: Simpson's rule, the middle on the cubic."""
+    target = row[at.TARGET * lanes + j]
+    e0, e1, middle = z0 - target, z1 - target, 0.5 * (z0 + z1) + 0.125 * h * (v0 - v1) - target
+    row[at.STEP_COST * lanes + j] += h / 6.0 * (e0 * e0 + 4.0 * middle * middle + e1 * e1)
+    deviation = abs(e1) if h > 0.0 else 0.0
+    row[at.OMEGA2 * lanes + j] = deviation if deviation > row[at.OMEGA2 * lanes + j] else row[at.OMEGA2 * lanes + j]
+    force, peak = row[at.TENSION * lanes + j], row[at.PEAK_TENSION * lanes + j]
+    row[at.PEAK_TENSION * lanes + j] = force if force > peak else peak
+    row[at.SLACK * lanes + j] = 1.0 if force <= 0.0 else row[at.SLACK * lanes + j]
+    parted = force > row[at.BREAKING_LOAD * lanes + j]
+    row[at.PARTED * lanes + j] = 1.0 if parted else row[at.PARTED * lanes + j]
+
+
+@scalar
+def activate(row: Array, frame: Array, line: float, index: int, lanes: int) -> bool:
+    """Mark the rows of the frame in that line of the tables that have an inner step ``index``; whether any has."""
+    found = 0.0
+    for j in range(lanes):
+        own = 1.0 if frame[flex.FRAME * lanes + j] == line else 0.0
+        active = own if index < row[at.SUBSTEPS * lanes + j] else 0.0
+        frame[flex.ACTIVE * lanes + j] = active
+        found += active
+    return found > 0.0
+
+
+@scalar
+def control_step(
+    row: Array, frame: Array, tables: Array, components: int, segments: int, records: Array, lanes: int
+) -> None:
+    """Advance a block by one control step of ``segments`` motion segments, the command held."""
+    most = 0.0
+    for j in range(lanes):
+        row[at.STEP_COST * lanes + j] = 0.0
+        row[at.PEAK_TENSION * lanes + j] = 0.0
+        row[at.SLACK * lanes + j] = 0.0
+        most = row[at.SUBSTEPS * lanes + j] if row[at.SUBSTEPS * lanes + j] > most else most
+    for _ in range(segments):
+        advance_deck(row, frame, components, records, lanes)
+        plan_winch(row, lanes)
+        for index in range(int(most)):
+            deck_at(row, frame, index, lanes)
+            for line in range(tables.shape[0]):
+                if activate(row, frame, line, index, lanes):
+                    predict(frame, tables[line], lanes)
+                    pull(row, frame, tables[line], index, lanes)
+                    finish(frame, tables[line], lanes)
+    for j in range(lanes):
+        row[at.OMEGA1 * lanes + j] += row[at.STEP_COST * lanes + j]
+
+
+class FlexibleKernels(NamedTuple):
+    """Compiled entry points for blocks of a given number of lanes.
+
+    Blocks: (B, slots * lanes) float64; frames: (B, flexible slots * lanes); tables: (frames, size).
+    """
+
+    step: Callable[[Array, Array, Array, int, int, Array], None]
+    """(blocks, frames, tables, components, segments, records): one control step, on the calling thread."""
+    step_parallel: Callable[[Array, Array, Array, int, int, Array], None]
+    """The same, blocks spread over the cores."""
+    start: Callable[[Array, Array, Array, float], None]
+    """(blocks, frames, tables, comoving): frames and loads in equilibrium, carried to where the deck is."""
+
+
+@cache
+def flexible_kernels(lanes: int = LANES) -> FlexibleKernels:
+    """Kernels for blocks of ``lanes`` rows (LANES for a batch, 1 for a single row)."""
+    source: Any = source_digest()
+
+    @kernel
+    def step(blocks: Array, frames: Array, tables: Array, components: int, segments: int, records: Array) -> None:
+        source  # noqa: B018  (a changed digest makes a new cache entry)
+        for block in range(blocks.shape[0]):
+            control_step(blocks[block], frames[block], tables, components, segments, records, lanes)
+
+    @parallel_kernel
+    def step_parallel(
+        blocks: Array, frames: Array, tables: Array, components: int, segments: int, records: Array
+    ) -> None:
+        source  # noqa: B018
+        for block in prange(blocks.shape[0]):
+            control_step(blocks[block], frames[block], tables, components, segments, records, lanes)
+
+    @kernel
+    def start(blocks: Array, frames: Array, tables: Array, comoving: float) -> None:
+        source  # noqa: B018
+        for block in range(blocks.shape[0]):
+            start_rows(blocks[block], frames[block], tables, comoving, lanes)
+
+    return FlexibleKernels(step, step_parallel, start)

@@ -1,0 +1,161 @@
+"""The engine of the full model: rows of ``Engine``, each with a flexible frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from aframe_env.crane import Frame
+from aframe_env.dynamics import layout as at
+from aframe_env.dynamics.flexible import layout as flex
+from aframe_env.dynamics.flexible.readout import READOUTS, readout_kernel, readout_table
+from aframe_env.dynamics.flexible.reduction import STATIC_SHAPES
+from aframe_env.dynamics.flexible.step import flexible_kernels
+from aframe_env.dynamics.flexible.tables import step_table
+from aframe_env.dynamics.rfem.chain import Division
+from aframe_env.engine import Engine, FloatArray, Timing
+from aframe_env.scenario import Scenario
+from aframe_env.validation import InvalidValue, require_integer
+
+FLEXIBLE_STEP: Final = 0.0125
+"""Longest inner step, s."""
+ROPE_PHASE: Final = 0.25
+"""Most that the load's bobbing on the rope turns in one inner step, rad; the scheme is stable up to some 2.4."""
+MOST_RFES: Final = 100
+"""Of a member: the modes of a finer frame take too long to find."""
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """How finely the frame is divided, and which of its modes are kept."""
+
+    division: Division
+    modes: int | None = None
+    """None for all."""
+
+    @property
+    def room(self) -> int:
+        """Most modal coordinates that a frame can have."""
+        free = 6 * (2 * self.division.leg + self.division.beam + 1) - 6
+        return free if self.modes is None else min(free, self.modes + STATIC_SHAPES)
+
+
+def mesh_of(model: str, rfes: tuple[int, int] | None, modes: int | None) -> Mesh | None:
+    """Mesh that an environment's arguments ask for; None for the simplified model, which takes none of them."""
+    if model != "rfem":
+        for name, value in (("rfes", rfes), ("rfem_modes", modes)):
+            if value is not None:
+                raise InvalidValue(f'{name} = {value!r}: only with model="rfem"')
+        return None
+    if modes is not None:
+        require_integer("rfem_modes", modes, low=1, high=10_000)
+    if rfes is None:
+        return Mesh(Division(), modes)
+    if not isinstance(rfes, tuple) or len(rfes) != 2:
+        raise InvalidValue(f"rfes = {rfes!r}: must be a pair of integers, the elements of a leg and of the beam")
+    require_integer("rfes (leg)", rfes[0], low=1, high=MOST_RFES)
+    require_integer("rfes (beam)", rfes[1], low=2, high=MOST_RFES)
+    if rfes[1] % 2:
+        raise InvalidValue(f"rfes = {rfes!r}: the beam's number must be even, for S to lie on its middle rfe")
+    return Mesh(Division(leg=rfes[0], beam=rfes[1]), modes)
+
+
+class FlexibleEngine(Engine):
+    """Rows of the full model side by side, each with its own scenario; frames may differ from row to row."""
+
+    def __init__(
+        self,
+        rows: int,
+        control_period: float,
+        mesh: Mesh,
+        components: int = 32,
+        max_inner_step: float | None = None,
+    ) -> None:
+        """Arguments as for ``Engine``, and the mesh. A stiff rope shortens ``max_inner_step`` too."""
+        self.mesh = mesh
+        self._slots = flex.slots(mesh.room)
+        self._lines: dict[tuple[Frame, float], int] = {}
+        self._tables, self._readout_tables = np.zeros((0, 0)), np.zeros((0, 0))
+        super().__init__(rows, control_period, components, max_inner_step)
+        self._flexible_kernels = flexible_kernels(self._lanes)
+        self._readout = readout_kernel(self._lanes, rows > at.LANES)
+
+    def read_frames(self) -> FloatArray:
+        """Deflection of S, reactions, servomotor tensions and utilisation of all rows: (rows, READOUTS)."""
+        result = np.zeros((self.rows, READOUTS))
+        self._readout(self._frames, self._readout_tables, result)
+        return result
+
+    @property
+    def frames(self) -> FloatArray:
+        """The frames' array, (blocks, slots * lanes); see ``dynamics.flexible.layout``."""
+        return self._frames
+
+    def row_vector(self, scenario: Scenario) -> FloatArray:
+        """Slots of a row at the start of a scenario, the frame's first: (frame slots + slots,)."""
+        row = super().row_vector(scenario)
+        frame = np.zeros(self._slots)
+        frame[flex.FRAME] = self._line(scenario)
+        frame[flex.DRUM : flex.DRUM + 3] = scenario.crane.drum_position
+        comoving = float(scenario.initial == "comoving")
+        flexible_kernels(1).start(row[None], frame[None], self._tables, comoving)
+        return np.concatenate([frame, row])
+
+    def write_row(self, index: int, vector: FloatArray) -> None:
+        """Overwrite a row with a vector that ``row_vector`` or ``copy_row`` gave."""
+        block, lane = divmod(index, self._lanes)
+        self._frame_view[block, :, lane] = vector[: self._slots]
+        super().write_row(index, vector[self._slots :])
+
+    def copy_row(self, index: int) -> FloatArray:
+        """Return everything the engine knows of a row: (frame slots + slots,)."""
+        block, lane = divmod(index, self._lanes)
+        return np.concatenate([self._frame_view[block, :, lane], super().copy_row(index)])
+
+    @property
+    def _frame_view(self) -> FloatArray:
+        return self._frames.reshape(len(self._frames), -1, self._lanes)
+
+    def _fill(self, vector: FloatArray) -> None:
+        self._frames = np.zeros((len(self._blocks), self._slots * self._lanes))
+        self._frame_view[...] = vector[None, : self._slots, None]
+        super()._fill(vector[self._slots :])
+
+    def _advance(self) -> None:
+        kernels = self._flexible_kernels
+        step = kernels.step if self.rows <= at.LANES else kernels.step_parallel
+        step(self._blocks, self._frames, self._tables, self._components, self._segments, self._records)
+
+    def _adopt(self, vector: FloatArray, scenario: Scenario) -> FloatArray:
+        adopted = np.concatenate([vector[: self._slots], super()._adopt(vector[self._slots :], scenario)])
+        adopted[flex.FRAME] = self._line(scenario)
+        return adopted
+
+    def _timing(self, scenario: Scenario) -> Timing:
+        segment = self.control_period / self._segments
+        longest = self._max_inner_step or FLEXIBLE_STEP
+        # Halved rather than fitted, so that a distribution of ropes needs few tables.
+        while longest * scenario.rope_frequency > ROPE_PHASE:
+            longest *= 0.5
+        return Timing(self._segments, segment, max(1, math.ceil(segment / longest - 1e-9)))
+
+    def _line(self, scenario: Scenario) -> int:
+        """Line of a scenario's frame in the tables, which it is added to when new."""
+        key = scenario.crane.frame, self._timing(scenario).inner_step
+        if key not in self._lines:
+            mesh = self.mesh
+            self._tables = _with_line(self._tables, step_table(key[0], mesh.division, mesh.modes, key[1]))
+            self._readout_tables = _with_line(self._readout_tables, readout_table(key[0], mesh.division, mesh.modes))
+            self._lines[key] = len(self._tables) - 1
+        return self._lines[key]
+
+
+def _with_line(table: FloatArray, line: FloatArray) -> FloatArray:
+    """Add a line to a table, the shorter ones filled up with zeros."""
+    longer = np.zeros((len(table) + 1, max(table.shape[1], line.size)))
+    longer[:-1, : table.shape[1]] = table
+    longer[-1, : line.size] = line
+    return longer
