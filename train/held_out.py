@@ -25,25 +25,46 @@ DURATION = 60.0
 FAMILIES: tuple[tuple[str, Literal["spline", "harmonic"]], ...] = (("S-Ω1", "spline"), ("H-Ω1", "harmonic"))
 
 
-def evaluate(policy: Policy, folder: Path, count: int, privileged: int, console: Console) -> None:
+def evaluate(
+    policy: Policy,
+    folder: Path,
+    count: int,
+    privileged: int,
+    console: Console,
+    *,
+    model: str = "simplified",
+    rfem_modes: int | None = None,
+) -> None:
     """Run every policy over ``count`` held-out scenarios and write the comparison into ``folder``.
 
-    The drives of the first ``privileged`` scenarios are optimised once more with the scenario's future known.
+    The drives of the first ``privileged`` scenarios are optimised once more with the scenario's future known; always
+    on the simplified model, whatever the ``model`` that the policies then run on.
     """
     distribution = ScenarioDistribution()
     scenarios = held_out_scenarios(distribution, count)
     observation: task.Observation = "state" if policy.knows is Knowledge.STATE else "sensors"
     with Progress(console=console) as progress:
         drives = optimise_all([distribution.nominal(), *scenarios[:privileged]], progress)
-        entries = [_entry(DrumStill(), scenarios, observation, progress)]
-        still = entries[0].episodes
-        entries.append(_entry(policy, scenarios, observation, progress))
+        policies: list[Policy] = [DrumStill(), policy]
         for name, family in FAMILIES:
-            nominal = DrivePolicy(name=name, drives=drives[family][:1] * count)
-            entries.append(_entry(nominal, scenarios, observation, progress))
+            policies.append(DrivePolicy(name=name, drives=drives[family][:1] * count))
         for name, family in FAMILIES if privileged else ():
-            known = DrivePolicy(name=f"{name} for each scenario", drives=drives[family][1:], knows=Knowledge.FUTURE)
-            entries.append(_entry(known, scenarios[:privileged], observation, progress))
+            known = drives[family][1:]
+            policies.append(DrivePolicy(name=f"{name} for each scenario", drives=known, knows=Knowledge.FUTURE))
+        entries = []
+        for each in policies:
+            bar = progress.add_task(each.name, total=round(DURATION / 0.1))
+            episodes = run(
+                each,
+                scenarios[:privileged] if each.knows is Knowledge.FUTURE else scenarios,
+                observation=observation,
+                episode_duration=DURATION,
+                model=model,
+                rfem_modes=rfem_modes,
+                progress=lambda step, bar=bar: progress.update(bar, completed=step),  # type: ignore[misc]
+            )
+            entries.append(Entry(each.name, each.knows, episodes))
+    still = entries[0].episodes
     rows = compare(entries, still)
     console.print(rich_table(rows))
     write_comparison(folder, rows, entries)
@@ -66,15 +87,3 @@ def optimise_all(scenarios: Sequence[Scenario], progress: Progress) -> dict[str,
 
 def _optimise(family: Literal["spline", "harmonic"], scenario: Scenario) -> OptimisedDrive:
     return optimise(family, scenario, duration=DURATION)
-
-
-def _entry(policy: Policy, scenarios: Sequence[Scenario], observation: task.Observation, progress: Progress) -> Entry:
-    bar = progress.add_task(policy.name, total=round(DURATION / 0.1))
-    episodes = run(
-        policy,
-        scenarios,
-        observation=observation,
-        episode_duration=DURATION,
-        progress=lambda step: progress.update(bar, completed=step),
-    )
-    return Entry(policy.name, policy.knows, episodes)

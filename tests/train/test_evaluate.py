@@ -1,0 +1,41 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from train import evaluate
+
+AGENT = Path(__file__).parents[2] / "results" / "ppo"
+
+
+def command(monkeypatch, *arguments):
+    monkeypatch.setattr("sys.argv", ["train.evaluate", *map(str, arguments)])
+    return evaluate.main()
+
+
+@pytest.mark.parametrize("model", ["simplified", "rfem"])
+def test_the_committed_agent_is_as_good_as_the_results_say(model, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    few = ("--scenarios", 12, "--privileged", 0)
+    assert command(monkeypatch, "--agent", AGENT, "--model", model, *few, "--out", out) == 0
+    rows = {row["policy"]: row for row in json.loads((out / "comparison.json").read_text(encoding="utf-8"))}
+    assert rows["PPO"]["reduction"]["median"] > 0.95
+    assert rows["PPO"]["worse_than_still"] == 0
+    assert json.loads((out / "run.json").read_text())["command"].startswith("python -m train.evaluate --agent")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--agent", "absent"), "no agent in 'absent'"),
+        (("--agent", AGENT, "--scenarios", 0), "scenarios = 0: must be in [1, 1000000]"),
+        (("--agent", AGENT, "--rfem-modes", 5), "rfem_modes"),
+    ],
+)
+def test_bad_options_are_one_clear_line(arguments, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as stopped:
+        command(monkeypatch, *arguments)
+    assert stopped.value.code == 2
+    assert words in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
