@@ -11,6 +11,7 @@ from aframe_env.crane import Crane, Frame, Rope, Winch
 from aframe_env.motion import Harmonic, HarmonicMotion
 from aframe_env.record import RecordedMotion
 from aframe_env.scenario import Scenario, ScenarioDistribution
+from aframe_env.scenario_file import read_scenario, scenario_text
 from aframe_env.sea import Sea, SeaMotion
 from aframe_env.sensors import Channel, Sensors
 from aframe_env.validation import InvalidValue
@@ -43,4 +44,6 @@ __all__ = [
     "Sensors",
     "Vessel",
     "Winch",
+    "read_scenario",
+    "scenario_text",
 ]
