@@ -27,6 +27,7 @@ from agents.optimisation import FAMILIES, OBJECTIVES, Family, ObjectiveName, opt
 from agents.optimisation import Progress as SearchProgress
 from train.config import parse
 from train.drive_experiment.figures import draw
+from train.drive_experiment.full_model import transfer
 from train.drive_experiment.notes import Variant, notes
 from train.drive_experiment.results import HEADINGS, Experiment, Result, SummaryRow, write_results
 from train.output import new_folder, user_errors, versions, write_json, write_text
@@ -65,6 +66,8 @@ class Options:
     """Most evaluations of the objective for each drive."""
     seed: int = 0
     """Turns the simplexes of the restarts."""
+    check: Literal["rfem"] | None = None
+    """Model to run the drives in once more: "rfem" is the full one, with the frame flexible."""
     out: Path | None = None
     """Output folder; by default runs/drives-DATE-TIME."""
     overwrite: bool = False
@@ -136,6 +139,16 @@ def solve(scenario: Scenario, options: Options, follow: Callable[[str], SearchPr
     return Experiment(times, required_angle(objective)[::2], tuple(results))
 
 
+def checked(scenario: Scenario, duration: float, experiment: Experiment, bars: Progress) -> Experiment:
+    """Run every drive in the full model too."""
+    bar = bars.add_task("full model", total=len(experiment.results), unit="runs")
+    results = []
+    for result in experiment.results:
+        results.append(replace(result, full=transfer(scenario, duration, result)))
+        bars.advance(bar)
+    return replace(experiment, results=tuple(results))
+
+
 def variants(options: Options, bars: Progress) -> list[Variant]:
     """The paper's case with other starts and rope dampings, which the source does not state."""
     found = []
@@ -170,6 +183,8 @@ def run(options: Options, console: Console) -> int:
             experiment = solve(scenario, options, follow)
             for bar in bars.task_ids:
                 bars.update(bar, total=bars.tasks[bar].completed)
+            if options.check is not None:
+                experiment = checked(scenario, options.duration, experiment, bars)
             others = variants(options, bars) if options.scenario is None else []
         except KeyboardInterrupt:
             console.print("interrupted: nothing was written")

@@ -29,6 +29,8 @@ def draw(folder: Path, target: float, radius: float, experiment: Experiment) -> 
         for family in dict.fromkeys(result.row.drive for result in drives):
             chosen = [result for result in drives if result.row.drive == family]
             _load(folder / f"load_{family}.png", family, times, chosen)
+        if still.full is not None:
+            _transfers(folder / "full_model.png", experiment)
         _amplitudes(folder / "amplitudes.png", experiment.results)
 
 
@@ -85,6 +87,26 @@ def _load(path: Path, family: str, times: FloatArray, drives: Sequence[Result]) 
     axes.set_ylim(low, high + 0.2 * (high - low))
     axes.grid(alpha=0.3)
     axes.legend(ncols=2, loc="upper center", fontsize=9)
+    _save(figure, path)
+
+
+def _transfers(path: Path, experiment: Experiment) -> None:
+    """Kinds of figures 14 and 16 to 18: the simplified model's load beside the full one's."""
+    results = experiment.results
+    figure = Figure(figsize=(8.0, 2.0 * len(results)), layout="constrained")
+    for axes, result in zip(figure.subplots(len(results), 1, sharex=True), results, strict=True):
+        if result.full is None:
+            continue
+        unit, scale = ("m", 1.0) if result.row.amplitude > 0.5 else ("mm", 1e3)
+        axes.plot(experiment.times, scale * result.error, color="#8a8f98", lw=1.2, label="simplified")
+        axes.plot(result.full.times, scale * result.full.error, color="#0b6e99", lw=1.2, label="full")
+        axes.axhline(0.0, color="black", lw=0.8, ls=":")
+        axes.set_ylabel(f"{result.row.label}, {unit}")
+        axes.set_xlim(0.0, experiment.times[-1])
+        axes.grid(alpha=0.3)
+    axes.set_xlabel("time, s")
+    figure.suptitle("Depth error x$_{L3}$ − h in the simplified and in the full model", fontsize=12)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=9)
     _save(figure, path)
 
 

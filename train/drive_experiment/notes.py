@@ -70,6 +70,29 @@ def _demands(results: Sequence[Result], times: FloatArray, winch: Winch) -> str:
     return f"\n## What the drives ask of the winch (rope; limits {limits})\n" + _table(headings, rows)
 
 
+def _transfers(results: Sequence[Result]) -> str:
+    """The same drives in the full model."""
+    rows = [
+        (
+            result.row.label,
+            f"{1e3 * result.row.amplitude:.4g}",
+            f"{1e3 * result.full.amplitude:.4g}",
+            f"{1e3 * result.full.swing:.4g}",
+        )
+        for result in results
+        if result.full is not None
+    ]
+    if not rows:
+        return ""
+    headings = ("drive", "amplitude, simplified, mm", "amplitude, full, mm", "swing, full, mm")
+    return (
+        "\n## The same drives in the full model\n"
+        + _table(headings, rows)
+        + "\nThe frame sags under the load, which the drives do not know of: the amplitude about h includes that. The\n"
+        "swing, half the distance from the lowest place to the highest, has not.\n"
+    )
+
+
 def notes(
     command: str,
     winch: Winch,
@@ -81,7 +104,7 @@ def notes(
     results = experiment.results
     text = f"# Optimised drum drives\nMade by `{command}`.\n\n"
     text += _table(HEADINGS, [result.row.cells for result in results])
-    text += _comparison(results) + _demands(results, experiment.times, winch)
+    text += _comparison(results) + _demands(results, experiment.times, winch) + _transfers(results)
     if variants:
         rows = [
             (

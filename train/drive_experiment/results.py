@@ -57,6 +57,31 @@ class SummaryRow:
 
 
 @dataclass(frozen=True)
+class Transfer:
+    """What a drive does in the full model."""
+
+    times: FloatArray
+    """s."""
+    error: FloatArray
+    """x_L3 - h at ``times``, m."""
+
+    @property
+    def omega1(self) -> float:
+        """Ω1, m² s."""
+        return float(np.trapezoid(self.error**2, self.times))
+
+    @property
+    def amplitude(self) -> float:
+        """Greatest distance of the load from h, m. The frame's sag under the load is part of it."""
+        return float(np.abs(self.error).max())
+
+    @property
+    def swing(self) -> float:
+        """Half the distance from the load's lowest to its highest place, m: the sag is no part of it."""
+        return 0.5 * float(np.ptp(self.error))
+
+
+@dataclass(frozen=True)
 class Result:
     """A row, its drive, and what the load does."""
 
@@ -64,6 +89,8 @@ class Result:
     drive: Drive | None
     error: FloatArray
     """x_L3 - h at the inner steps, m."""
+    full: Transfer | None = None
+    """The same in the full model, if that was asked for."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +127,19 @@ def demand(drive: Drive, times: FloatArray) -> Demand:
 def write_results(folder: Path, experiment: Experiment) -> None:
     """Write summary.json, summary.csv, drives.json (decision variables) and histories.csv."""
     times, results = experiment.times, experiment.results
-    rows = [asdict(result.row) for result in results]
+    rows = [
+        asdict(result.row)
+        | (
+            {}
+            if result.full is None
+            else {
+                "omega1_rfem": result.full.omega1,
+                "amplitude_rfem": result.full.amplitude,
+                "swing_rfem": result.full.swing,
+            }
+        )
+        for result in results
+    ]
     write_json(folder / "summary.json", rows)
     text = io.StringIO()
     table = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
