@@ -165,6 +165,6 @@ def test_bad_input_is_named():
     with pytest.raises(InvalidValue, match=r"output_interval.*\(0, 1\] s"):
         DynamicCase(duration=1.0, output_interval=2.0)
     with pytest.raises(InvalidValue, match=r"step = 0.5 s: must be smaller"):
-        simulate(DynamicCase(step=0.5, output_interval=0.5), model=model(5, 2))
+        simulate(DynamicCase(scenario=Scenario(load_mass=100.0), step=0.5, output_interval=0.5), model=model(5, 2))
     with pytest.raises(InvalidValue, match="frame"):
         simulate(model=frame_model(replace(Crane().frame, height=13.0)))
