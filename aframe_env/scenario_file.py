@@ -70,7 +70,15 @@ def read_scenario(path: str | Path) -> Scenario:
         raise InvalidValue(f"scenario = {str(path)!r}: cannot be read: {error}") from error
     except tomllib.TOMLDecodeError as error:
         raise InvalidValue(f"{path}: not TOML: {error}") from error
-    return structure(_converter(path.parent), data, Scenario, str(path))
+    return scenario_of(data, path.parent, str(path))
+
+
+def scenario_of(data: Mapping[str, Any], folder: Path, source: str) -> Scenario:
+    """Make a scenario of what a file says, looking in ``folder`` for the files that it names.
+
+    Raises ``InvalidValue`` that begins with ``source`` and names the key of what is wrong.
+    """
+    return structure(_converter(folder), data, Scenario, source)
 
 
 def scenario_text(scenario: Scenario) -> str:

@@ -20,15 +20,15 @@ import argparse
 import platform
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy
 
-from aframe_env.validation import InvalidValue
-from train.output import write_json, write_text
+from train.output import user_errors, write_json, write_text
 from train.verification import frame_checks, run_checks
 from train.verification.cases import (
     FORMAT,
@@ -43,7 +43,12 @@ from train.verification.report import Check, markdown
 
 __doc__ = f"{__doc__}\n{FORMAT}"
 
-CASE_KINDS = {"load_case": static_case, "release": release_case, "dynamic": dynamic_case}
+CASE_KINDS: Mapping[str, Callable[[Mapping[str, Any], Path], dict[str, object]]] = {
+    "load_case": lambda data, _: static_case(data),
+    "release": lambda data, _: release_case(data),
+    "dynamic": dynamic_case,
+}
+"""What runs a case, given what its file says and the file's folder."""
 
 
 def run_all(*, say: bool = True) -> list[Check]:
@@ -114,22 +119,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, metavar="FILE.json", help="where that case's result goes")
     parser.add_argument("--folder", type=Path, default=Path("results/verification"), help="where table and pictures go")
     given = parser.parse_args(arguments)
-    try:
+    with user_errors():
         for name, solve in CASE_KINDS.items():
             path: Path | None = getattr(given, name)
             if path is not None:
                 if given.out is None:
                     parser.error(f"--{name.replace('_', '-')} needs --out FILE.json")
-                write_json(given.out, without_nan(solve(read_toml(path))))
+                write_json(given.out, without_nan(solve(read_toml(path), path.parent)))
                 return 0
-    except InvalidValue as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    if given.out is not None:
-        parser.error("--out goes with --load-case, --release or --dynamic")
-    checks = run_all()
-    write_report(checks, given.folder)
-    return 0 if all(check.passed for check in checks) else 1
+        if given.out is not None:
+            parser.error("--out goes with --load-case, --release or --dynamic")
+        checks = run_all()
+        write_report(checks, given.folder)
+        return 0 if all(check.passed for check in checks) else 1
 
 
 if __name__ == "__main__":

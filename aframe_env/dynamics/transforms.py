@@ -1,4 +1,4 @@
-"""Rigid-body kinematics of a point fixed in the moving deck, eq. (38): R = Rz(yaw) Ry(pitch) Rx(roll)."""
+"""Rigid-body kinematics of the moving deck and of a point fixed in it, eq. (38): R = Rz(yaw) Ry(pitch) Rx(roll)."""
 
 from __future__ import annotations
 
@@ -90,3 +90,36 @@ def rotate_pair(
         dda - 2.0 * rate * db - acceleration * b - rate * rate * a,
         ddb + 2.0 * rate * da + acceleration * a - rate * rate * b,
     )
+
+
+@scalar
+def turn(
+    roll: float, pitch: float, yaw: float, p: float, q: float, r: float, pp: float, qq: float, rr: float
+) -> tuple[
+    tuple[float, float, float, float, float, float, float, float, float],
+    tuple[float, float, float],
+    tuple[float, float, float],
+]:
+    """Rotation {D} → base, eq. (38), row-major; angular velocity and acceleration along {D}; from the angles
+    [rad], their rates (p, q, r) and accelerations (pp, qq, rr)."""
+    sr, cr = sine_cosine(roll)
+    sp, cp = sine_cosine(pitch)
+    sy, cy = sine_cosine(yaw)
+    rotation = (
+        cy * cp,
+        cy * sp * sr - sy * cr,
+        cy * sp * cr + sy * sr,
+        sy * cp,
+        sy * sp * sr + cy * cr,
+        sy * sp * cr - cy * sr,
+        -sp,
+        cp * sr,
+        cp * cr,
+    )
+    spin = (p - r * sp, q * cr + r * cp * sr, -q * sr + r * cp * cr)
+    spin_up = (
+        pp - rr * sp - r * cp * q,
+        qq * cr - q * sr * p + rr * cp * sr - r * sp * q * sr + r * cp * cr * p,
+        -qq * sr - q * cr * p + rr * cp * cr - r * sp * q * cr - r * cp * sr * p,
+    )
+    return rotation, spin, spin_up

@@ -1,4 +1,6 @@
+import errno
 import json
+import os
 
 import pytest
 
@@ -27,9 +29,10 @@ def test_release_has_the_reference_columns():
 
 
 def test_dynamic_case_has_the_reference_columns():
-    harmonic = {"direction": "heave", "amplitude": 1.0, "period": 9.0}
+    harmonic = {"coordinate": "heave", "amplitude": 1.0, "period": 9.0}
+    motion = {"kind": "harmonic", "harmonics": [harmonic]}
     columns = dynamic_case(
-        {"rfes": [5, 2], "deck": [harmonic], "duration": 0.2, "initial": "rest", "rope_damping": 1e4}
+        {"rfes": [5, 2], "motion": motion, "duration": 0.2, "initial": "rest", "rope_damping": 1e4, "ramp": 2.0}
     )
     assert set(columns) == set(time_series("paper_flexible"))
 
@@ -59,12 +62,51 @@ def test_bad_keys_are_named(data, words):
 def test_errors_reach_the_user_without_a_traceback(tmp_path, capsys):
     case = tmp_path / "case.toml"
     case.write_text("own_weight = maybe\n")
-    assert main(["--load-case", str(case), "--out", str(tmp_path / "out.json")]) == 2
-    assert "is not TOML" in capsys.readouterr().err
-    assert main(["--release", str(tmp_path / "none.toml"), "--out", str(tmp_path / "out.json")]) == 2
-    assert "cannot be read" in capsys.readouterr().err
+    out = str(tmp_path / "out.json")
+    for arguments, words in (
+        (["--load-case", str(case)], "is not TOML"),
+        (["--release", str(tmp_path / "none.toml")], "cannot be read"),
+    ):
+        with pytest.raises(SystemExit, match="2"):
+            main([*arguments, "--out", out])
+        assert words in capsys.readouterr().err
 
 
-def test_bad_deck_is_named():
-    with pytest.raises(InvalidValue, match=r"deck\.period: missing"):
-        dynamic_case({"deck": [{"direction": "heave", "amplitude": 1.0}]})
+def test_full_disk_is_one_line(tmp_path, capsys, monkeypatch):
+    def full(path, data):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+    monkeypatch.setattr("train.verify.write_json", full)
+    case = tmp_path / "case.toml"
+    case.write_text("rfes = [2, 2]\n")
+    with pytest.raises(SystemExit, match="2"):
+        main(["--load-case", str(case), "--out", str(tmp_path / "out.json")])
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_dynamic_case_finds_files_beside_its_own(tmp_path):
+    lines = [f"{0.1 * k:.1f},0,0,{0.01 * k},0,0,0" for k in range(12)]
+    (tmp_path / "ship.csv").write_text("\n".join(["time_s,surge_m,sway_m,heave_m,roll_deg,pitch_deg,yaw_deg", *lines]))
+    case, out = tmp_path / "case.toml", tmp_path / "out.json"
+    case.write_text('rfes = [2, 2]\nduration = 0.5\n[motion]\nkind = "recorded"\nfile = "ship.csv"\n')
+    assert main(["--dynamic", str(case), "--out", str(out)]) == 0
+    assert json.loads(out.read_text())["t_s"][-1] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        ({"required_height": -200.0}, "required_height: unknown key; must be one of"),
+        ({"crane": {"frame": {"hieght": 9.0}}}, r"\[crane.frame\] unknown key 'hieght'"),
+        (
+            {"motion": {"kind": "harmonic", "harmonics": [{"coordinate": "heave", "amplitude": 1.0}]}},
+            "'period'.*missing",
+        ),
+        ({"target_level": 20.0}, "target_level.*below the pulley"),
+        ({"duration": "long"}, "duration"),
+        ({"rfes": [5, 3]}, "even"),
+    ],
+)
+def test_bad_keys_of_a_dynamic_case_are_named(data, words):
+    with pytest.raises(InvalidValue, match=words):
+        dynamic_case(data)

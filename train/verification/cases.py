@@ -14,12 +14,13 @@ import numpy.typing as npt
 
 from aframe_env.crane import Crane, Frame
 from aframe_env.dynamics.rfem.chain import Division
-from aframe_env.dynamics.rfem.deck import DeckHarmonic, HarmonicDeck, paper_motion
 from aframe_env.dynamics.rfem.dynamics import DynamicCase, DynamicResult, simulate
 from aframe_env.dynamics.rfem.history import FrameHistory
 from aframe_env.dynamics.rfem.model import FrameModel, frame_model
 from aframe_env.dynamics.rfem.release import release
 from aframe_env.dynamics.rfem.statics import LOADED_POINTS, LoadCase, static
+from aframe_env.scenario import Scenario
+from aframe_env.scenario_file import scenario_of
 from aframe_env.section import Servomotor
 from aframe_env.validation import InvalidValue, require_choice, require_number
 
@@ -30,6 +31,8 @@ Files are TOML, SI units. Keys of every kind of file (all optional):
                                for a dynamic run the default is [20, 16]
   layout = "one_chain"         or "three_beams", the paper's previous model
   corrected_shear = false      true: static deflections exact at any number of elements
+
+--load-case and --release, the crane:
   servomotors = "rigid"        or "elastic", then also
   servomotor_stiffness = 3e8   N/m, each
   servomotor_damping = 0.0     N s/m, each, elastic only
@@ -50,41 +53,34 @@ its own weight stays; undamped:
   step = 0.0001                s
 
 --dynamic, the load on the rope, the ship moving, the drum still:
-  load_mass = 100000.0         kg
-  required_height = -300.0     m, h: the load's height at rest with the frame rigid
-  initial = "comoving"         or "rest"
-  rope_damping = 0.0           N s/m, d_R
   duration = 60.0              s
   output_interval = 0.05       s
   step = 0.0025                s
-  [[deck]]                     one table a harmonic, amplitude sin(2 pi t/period + phase);
-  direction = "heave"          surge, sway, heave (m), roll, pitch, yaw (rad)
-  amplitude = 2.0              without any: motion (42), surge 1 m/6 s and heave 2 m/12 s
+                               and the keys of a scenario file, among them
+  load_mass = 100000.0         kg
+  target_level = -300.0        m, h: the load's height at rest with the frame rigid
+  initial = "comoving"         or "rest"
+  rope_damping = 0.0           N s/m, d_R
+  ramp = 0.0                   s, over which the ship's motion builds up
+  gravity = 9.81               m/s²
+  [motion]                     without it: motion (42), surge 1 m/6 s and heave 2 m/12 s
+  kind = "harmonic"            or "sea", or "recorded" with file = "x.csv"
+  [[motion.harmonics]]         one table a harmonic, amplitude sin(2 pi t/period + phase)
+  coordinate = "heave"         surge, sway, heave (m), roll, pitch, yaw (rad)
+  amplitude = 2.0
   period = 12.0                s
   phase = 0.0                  rad
+  [crane.frame]                half_width, height, servomotor_height, servomotor_deck_x (m),
+                               luffing_angle (rad)
+  [crane.frame.structure.servomotor]
+  stiffness = 3e8              N/m, each; without it: rigid
+  damping = 0.0                N s/m, each
 """
 
-_COMMON = {
-    "rfes",
-    "layout",
-    "corrected_shear",
-    "servomotors",
-    "servomotor_stiffness",
-    "servomotor_damping",
-    "frame",
-}
+_MODEL = {"rfes", "layout", "corrected_shear"}
+_RUN = {"duration", "output_interval", "step"}
+_CRANE = {"servomotors", "servomotor_stiffness", "servomotor_damping", "frame"}
 _STATIC = {"own_weight", "rope_tension", "forces"}
-_RELEASE = {"ramp", "duration", "output_interval", "step"}
-_DYNAMIC = {
-    "load_mass",
-    "required_height",
-    "initial",
-    "rope_damping",
-    "duration",
-    "output_interval",
-    "step",
-    "deck",
-}
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -175,7 +171,7 @@ def _load_case(data: Mapping[str, Any]) -> LoadCase:
 
 def static_case(data: Mapping[str, Any]) -> dict[str, object]:
     """Solve a static case: the keys of the reference data's cases, and the section forces along the frame."""
-    _only(data, _COMMON | _STATIC)
+    _only(data, _MODEL | _CRANE | _STATIC)
     crane = crane_of(data)
     result = static(crane, _load_case(data), model=model_of(data, crane, (120, 100)))
     report = result.reference_case()
@@ -212,7 +208,7 @@ def dynamic_columns(result: DynamicResult) -> dict[str, npt.NDArray[np.float64]]
 
 def release_case(data: Mapping[str, Any]) -> dict[str, object]:
     """Run a release; time series with the column names of the reference data."""
-    _only(data, _COMMON | _STATIC | _RELEASE)
+    _only(data, _MODEL | _CRANE | _STATIC | _RUN | {"ramp"})
     crane = crane_of(data)
     history = release(
         crane,
@@ -226,22 +222,18 @@ def release_case(data: Mapping[str, Any]) -> dict[str, object]:
     return {name: column.tolist() for name, column in columns_of(history).items()}
 
 
-def dynamic_case(data: Mapping[str, Any]) -> dict[str, object]:
-    """Run a dynamic case; time series with the column names of the reference data."""
-    _only(data, _COMMON | _DYNAMIC)
-    crane = crane_of(data)
-    harmonics = data.get("deck", [])
-    if not isinstance(harmonics, list):
-        raise InvalidValue(f"deck = {harmonics!r}: must be tables, [[deck]]")
-    names = {item.name for item in fields(DeckHarmonic)}
-    for harmonic in harmonics:
-        _only(harmonic, names, "deck.")
-        for name in ("direction", "amplitude", "period"):
-            if name not in harmonic:
-                raise InvalidValue(f"deck.{name}: missing; needed in every [[deck]]")
-    motion = HarmonicDeck(tuple(DeckHarmonic(**item) for item in harmonics)) if harmonics else paper_motion()
-    plain = {name: data[name] for name in _DYNAMIC - {"deck"} if name in data}
-    result = simulate(crane, DynamicCase(deck=motion, **plain), model=model_of(data, crane, (20, 16)))
+def dynamic_case(data: Mapping[str, Any], folder: Path = Path()) -> dict[str, object]:
+    """Run a dynamic case; time series with the column names of the reference data.
+
+    Args:
+        data: What the file says.
+        folder: Where the files are that it names.
+    """
+    keys = {item.name for item in fields(Scenario)}
+    _only(data, _MODEL | _RUN | keys)
+    scenario = scenario_of({name: value for name, value in data.items() if name in keys}, folder, "scenario")
+    case = DynamicCase(scenario=scenario, **{name: data[name] for name in _RUN if name in data})
+    result = simulate(case, model=model_of(data, scenario.crane, (20, 16)))
     return {name: column.tolist() for name, column in dynamic_columns(result).items()}
 
 

@@ -10,12 +10,12 @@ import numpy as np
 
 from aframe_env.crane import Crane
 from aframe_env.dynamics.rfem.beam import Array
-from aframe_env.dynamics.rfem.deck import DeckHarmonic, HarmonicDeck
 from aframe_env.dynamics.rfem.dynamics import DynamicCase, DynamicResult, simulate
 from aframe_env.dynamics.rfem.energy import energy_balance
-from aframe_env.dynamics.rfem.model import frame_model
 from aframe_env.dynamics.rfem.reference import time_series
 from aframe_env.dynamics.rfem.release import release
+from aframe_env.motion import COORDINATES, Harmonic, HarmonicMotion
+from aframe_env.scenario import Scenario
 from train.verification.cases import columns_of, dynamic_columns
 from train.verification.frame_checks import CASES, model, order
 from train.verification.report import Check, Row
@@ -58,7 +58,7 @@ def ramp_release(leg: int = 120, beam: int = 100) -> Comparison:
 @cache
 def paper_run(step: float = 2.5e-3) -> DynamicResult:
     """The paper's motion (42), drum still, at 20/16."""
-    return simulate(Crane(), DynamicCase(step=step), model=model(20, 16))
+    return simulate(DynamicCase(step=step), model=model(20, 16))
 
 
 def releases() -> Check:
@@ -130,7 +130,7 @@ def stiff_frame() -> Check:
         shear_modulus=1e3 * frame.structure.material.shear_modulus,
     )
     stiff = replace(frame, structure=replace(frame.structure, material=material))
-    result = simulate(Crane(frame=stiff), DynamicCase(step=1e-3), model=frame_model(stiff))
+    result = simulate(DynamicCase(scenario=Scenario.paper(crane=Crane(frame=stiff)), step=1e-3))
     gap = float(np.max(np.abs(result.load[:, 2] - time_series("paper_rigid")["xL3_m"])))
     return Check(
         name="frame 1000 × stiffer, 60 s, step 1 ms",
@@ -143,12 +143,12 @@ def stiff_frame() -> Check:
 def energy() -> Check:
     """Work of the deck against what is stored and lost."""
     case = DynamicCase(step=2.5e-3, output_interval=2.5e-3)
-    still = energy_balance(simulate(Crane(), case)).error
+    still = energy_balance(simulate(case)).error
     frame = Crane().frame
     lossy = replace(frame.structure.material, normal_damping=2.1e8, tangential_damping=5e7)
     damped = replace(frame, structure=replace(frame.structure, material=lossy))
-    damped_case = replace(case, rope_damping=5e4, initial="rest")
-    lost = energy_balance(simulate(Crane(frame=damped), damped_case, model=frame_model(damped)))
+    scenario = Scenario.paper(initial="rest", rope_damping=5e4, crane=Crane(frame=damped))
+    lost = energy_balance(simulate(replace(case, scenario=scenario)))
     worst = max(still, lost.error)
     return Check(
         name="energy balance over 60 s, step 2.5 ms",
@@ -161,7 +161,7 @@ def energy() -> Check:
 
 def steps() -> Check:
     """Halving the step."""
-    runs = {h: simulate(Crane(), DynamicCase(step=h)).load[:, 2] for h in (0.01, 0.005, 0.0025, 0.00125)}
+    runs = {h: simulate(DynamicCase(step=h)).load[:, 2] for h in (0.01, 0.005, 0.0025, 0.00125)}
     finest = runs[0.00125] + (runs[0.00125] - runs[0.0025]) / 3.0
     errors = {h: float(np.max(np.abs(run - finest))) for h, run in runs.items()}
     orders = [order(errors[a], errors[b]) for a, b in ((0.01, 0.005), (0.005, 0.0025))]
@@ -182,19 +182,19 @@ def steps() -> Check:
     )
 
 
-def rough_sea(seed: int = 20090601) -> HarmonicDeck:
+def rough_sea(seed: int = 20090601) -> HarmonicMotion:
     """A rough irregular motion in all six directions: 12 harmonics each, periods of 5 to 20 s."""
     random = np.random.default_rng(seed)
-    amplitudes = {"surge": 0.5, "sway": 0.5, "heave": 0.9, "roll": 0.03, "pitch": 0.02, "yaw": 0.01}
-    return HarmonicDeck(
-        tuple(
-            DeckHarmonic(
-                direction=direction,
+    scales = (0.5, 0.5, 0.9, 0.03, 0.02, 0.01)
+    return HarmonicMotion(
+        harmonics=tuple(
+            Harmonic(
+                coordinate=coordinate,
                 amplitude=float(scale / np.sqrt(6.0) * random.uniform(0.5, 1.5)),
                 period=float(random.uniform(5.0, 20.0)),
                 phase=float(random.uniform(0.0, 2.0 * np.pi)),
             )
-            for direction, scale in amplitudes.items()
+            for coordinate, scale in zip(COORDINATES, scales, strict=True)
             for _ in range(12)
         )
     )
@@ -203,8 +203,9 @@ def rough_sea(seed: int = 20090601) -> HarmonicDeck:
 def drift() -> Check:
     """Feet and cylinders after ten minutes."""
     begin = time.perf_counter()
-    case = DynamicCase(deck=rough_sea(), duration=600.0, step=0.02, output_interval=0.2, rope_damping=2e4)
-    result = simulate(Crane(), case, model=model(5, 2))
+    scenario = Scenario.paper(motion=rough_sea(), rope_damping=2e4)
+    case = DynamicCase(scenario=scenario, duration=600.0, step=0.02, output_interval=0.2)
+    result = simulate(case, model=model(5, 2))
     moved = result.frame.constraint_violation()
     heave = float(np.ptp(result.deck.position[:, 2]))
     return Check(

@@ -9,42 +9,9 @@ from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.compiling import scalar
 from aframe_env.dynamics.flexible import layout as flex
 from aframe_env.dynamics.motion import advance_motion, on_quintic, quintic
-from aframe_env.dynamics.transforms import sine_cosine
+from aframe_env.dynamics.transforms import turn
 
 Block = npt.NDArray[np.float64]
-
-
-@scalar
-def turn(
-    roll: float, pitch: float, yaw: float, p: float, q: float, r: float, pp: float, qq: float, rr: float
-) -> tuple[
-    tuple[float, float, float, float, float, float, float, float, float],
-    tuple[float, float, float],
-    tuple[float, float, float],
-]:
-    """Rotation {D} → base, eq. (38), row-major; angular velocity and acceleration along {D}; from the angles
-    [rad], their rates (p, q, r) and accelerations (pp, qq, rr)."""
-    sr, cr = sine_cosine(roll)
-    sp, cp = sine_cosine(pitch)
-    sy, cy = sine_cosine(yaw)
-    rotation = (
-        cy * cp,
-        cy * sp * sr - sy * cr,
-        cy * sp * cr + sy * sr,
-        sy * cp,
-        sy * sp * sr + cy * cr,
-        sy * sp * cr - cy * sr,
-        -sp,
-        cp * sr,
-        cp * cr,
-    )
-    spin = (p - r * sp, q * cr + r * cp * sr, -q * sr + r * cp * cr)
-    spin_up = (
-        pp - rr * sp - r * cp * q,
-        qq * cr - q * sr * p + rr * cp * sr - r * sp * q * sr + r * cp * cr * p,
-        -qq * sr - q * cr * p + rr * cp * cr - r * sp * q * cr - r * cp * sr * p,
-    )
-    return rotation, spin, spin_up
 
 
 @scalar

@@ -1,17 +1,16 @@
-"""Motion of the deck as the full model's stand-alone runs take it: a sum of harmonics in six directions."""
+"""The deck of a scenario over a stand-alone run of the full model."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, fields
 
 import numpy as np
 
+from aframe_env.dynamics.motion import smooth_ramp
 from aframe_env.dynamics.rfem.beam import Array
-from aframe_env.validation import require_choice, require_number
-
-DIRECTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+from aframe_env.dynamics.transforms import turn
+from aframe_env.motion import ComponentMotion, require_coverage
+from aframe_env.scenario import Scenario
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,90 +30,45 @@ class DeckStates:
     angular_acceleration: Array
     """Along {D}, (k, 3), rad/s²."""
 
-
-class DeckMotion(Protocol):
-    """Whatever knows where the deck is."""
-
-    def states(self, times: Array) -> DeckStates:
-        """Return the deck's states at ``times``, (k,), s."""
-        ...
+    def every(self, stride: int) -> DeckStates:
+        """Every ``stride``-th of them from the first."""
+        return DeckStates(**{item.name: getattr(self, item.name)[::stride] for item in fields(self)})
 
 
-@dataclass(frozen=True, kw_only=True)
-class DeckHarmonic:
-    """amplitude · sin(2π t / period + phase) in one direction."""
+def deck_coordinates(scenario: Scenario, step: float, count: int) -> Array:
+    """The deck's six coordinates with the scenario's ramp, their rates and accelerations: (3, count, 6).
 
-    direction: str
-    """surge, sway, heave (m), roll, pitch or yaw (rad)."""
-    amplitude: float
-    """m or rad."""
-    period: float
-    """s, above 0."""
-    phase: float = 0.0
-    """rad."""
+    Args:
+        scenario: Its motion and its ramp.
+        step: Of the times 0, step, 2 step, ...; s.
+        count: How many times.
 
-    def __post_init__(self) -> None:
-        require_choice("direction", self.direction, DIRECTIONS)
-        require_number("amplitude", self.amplitude, "m or rad")
-        require_number("period", self.period, "s", low=0.0, low_open=True)
-        require_number("phase", self.phase, "rad")
-
-
-@dataclass(frozen=True)
-class HarmonicDeck:
-    """Sum of harmonics; without any, the deck is at rest."""
-
-    components: tuple[DeckHarmonic, ...] = ()
-
-    def states(self, times: Array) -> DeckStates:
-        """Return the deck's states at ``times``, (k,), s."""
-        values = np.zeros((3, 6, times.size))
-        for item in self.components:
-            row, rate = DIRECTIONS.index(item.direction), 2.0 * math.pi / item.period
-            angle = rate * times + item.phase
-            values[0, row] += item.amplitude * np.sin(angle)
-            values[1, row] += item.amplitude * rate * np.cos(angle)
-            values[2, row] -= item.amplitude * rate**2 * np.sin(angle)
-        place, speed, acceleration = values[:, :3].transpose(0, 2, 1)
-        rotation, turning, spin_up = _euler(*values[:, 3:])
-        return DeckStates(
-            position=place,
-            velocity=speed,
-            acceleration=acceleration,
-            rotation=rotation,
-            angular_velocity=turning,
-            angular_acceleration=spin_up,
-        )
+    Raises:
+        InvalidValue: The motion is a record that is too short.
+    """
+    times = step * np.arange(count, dtype=np.float64)
+    if isinstance(scenario.motion, ComponentMotion):
+        motion = scenario.motion.components().at(times)
+    else:
+        require_coverage(scenario.motion, "duration", float(times[-1]))
+        motion = scenario.motion.table(step)[:count].reshape(count, 3, 6).transpose(1, 0, 2)
+    if not scenario.ramp:
+        return motion
+    place, rate, acceleration = motion
+    r, dr, ddr = np.array([smooth_ramp(time, 1.0 / scenario.ramp, 0.0) for time in times.tolist()]).T[:, :, None]
+    return np.stack([r * place, r * rate + dr * place, r * acceleration + 2.0 * dr * rate + ddr * place])
 
 
-def _euler(angles: Array, rates: Array, seconds: Array) -> tuple[Array, Array, Array]:
-    """Rotation matrix, angular velocity and acceleration along {D} of roll, pitch, yaw, each (3, k)."""
-    (roll, pitch, yaw), (p, q, r), (pp, qq, rr) = angles, rates, seconds
-    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
-    cy, sy = np.cos(yaw), np.sin(yaw)
-    rotation = np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    ).transpose(2, 0, 1)
-    velocity = np.array([p - r * sp, q * cr + r * cp * sr, -q * sr + r * cp * cr]).T
-    acceleration = np.array(
-        [
-            pp - rr * sp - r * cp * q,
-            qq * cr - q * sr * p + rr * cp * sr - r * sp * q * sr + r * cp * cr * p,
-            -qq * sr - q * cr * p + rr * cp * cr - r * sp * q * cr - r * cp * sr * p,
-        ]
-    ).T
-    return rotation, velocity, acceleration
-
-
-def paper_motion() -> HarmonicDeck:
-    """Ship motion (42): surge 1 m with a period of 6 s, heave 2 m with a period of 12 s, both sines."""
-    return HarmonicDeck(
-        (
-            DeckHarmonic(direction="surge", amplitude=1.0, period=6.0),
-            DeckHarmonic(direction="heave", amplitude=2.0, period=12.0),
-        )
+def deck_states(coordinates: Array) -> DeckStates:
+    """Pose, velocities and accelerations of a deck with these coordinates, rates and accelerations, (3, k, 6)."""
+    place, speed, acceleration = coordinates[:, :, :3]
+    angles = coordinates[:, :, 3:].transpose(1, 0, 2).reshape(-1, 9)
+    rotation, turning, spin_up = zip(*(turn(*row) for row in angles.tolist()), strict=True)
+    return DeckStates(
+        position=place,
+        velocity=speed,
+        acceleration=acceleration,
+        rotation=np.array(rotation).reshape(-1, 3, 3),
+        angular_velocity=np.array(turning),
+        angular_acceleration=np.array(spin_up),
     )

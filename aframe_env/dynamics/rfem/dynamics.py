@@ -11,23 +11,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aframe_env.crane import GRAVITY
 from aframe_env.dynamics.rfem.beam import Array
 from aframe_env.dynamics.rfem.chain import cross_matrix
-from aframe_env.dynamics.rfem.deck import DeckMotion, DeckStates, paper_motion
+from aframe_env.dynamics.rfem.deck import DeckStates, deck_coordinates, deck_states
 from aframe_env.dynamics.rfem.history import FrameHistory
 from aframe_env.dynamics.rfem.integrator import AverageAcceleration
 from aframe_env.dynamics.rfem.model import CarriedInertia, FrameModel, apply_blocks, frame_model
 from aframe_env.dynamics.rfem.rope_law import RopeForce, rope_force
 from aframe_env.dynamics.rfem.statics import solve
-from aframe_env.validation import InvalidValue, require_choice, require_number
-
-if TYPE_CHECKING:
-    from aframe_env.crane import Crane
+from aframe_env.scenario import Scenario
+from aframe_env.validation import InvalidValue, require_number
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,19 +61,11 @@ Drum = StillDrum | PrescribedDrum | DrivenDrum
 class DynamicCase:
     """One dynamic run."""
 
-    load_mass: float = 1.0e5
-    """kg."""
-    required_height: float = -300.0
-    """h, x_L3 at rest with the frame rigid, m: fixes the unstretched length l_0."""
-    deck: DeckMotion = field(default_factory=paper_motion)
-    """Ship motion; default the paper's (42)."""
+    scenario: Scenario = field(default_factory=Scenario.paper)
+    """Crane, ship motion, load and rope; the load starts from static equilibrium. Luffing angle and servomotor
+    lengths stay as they are."""
     drum: Drum = field(default_factory=StillDrum)
     """What the drum does."""
-    rope_damping: float = 0.0
-    """d_R, N s/m."""
-    initial: str = "comoving"
-    """Load's start, from static equilibrium: ``"comoving"`` (with the velocity of S carried by the deck) or
-    ``"rest"`` (no velocity)."""
     duration: float = 60.0
     """s."""
     step: float = 2.5e-3
@@ -86,10 +74,6 @@ class DynamicCase:
     """s."""
 
     def __post_init__(self) -> None:
-        require_number("load_mass", self.load_mass, "kg", low=0.0, low_open=True)
-        require_number("required_height", self.required_height, "m")
-        require_number("rope_damping", self.rope_damping, "N s/m", low=0.0)
-        require_choice("initial", self.initial, ("rest", "comoving"))
         require_number("duration", self.duration, "s", low=0.0, low_open=True)
         require_number("step", self.step, "s", low=0.0, low_open=True)
         require_number("output_interval", self.output_interval, "s", low=0.0, low_open=True)
@@ -102,7 +86,6 @@ class DynamicResult:
     """A run at k times. The load in the base frame, the frame's vectors along {D}."""
 
     case: DynamicCase
-    crane: Crane
     frame: FrameHistory
     load: Array
     """x_L, (k, 3), m."""
@@ -119,8 +102,6 @@ class DynamicResult:
     drum_rate: Array
     """(k,), rad/s."""
     deck: DeckStates
-    unstretched: float
-    """l_0, m."""
 
     @property
     def time(self) -> Array:
@@ -131,14 +112,14 @@ class DynamicResult:
 class _Carriage:
     """The deck at every step, in the shape that the frame's axes {F} want."""
 
-    def __init__(self, crane: Crane, model: FrameModel, deck: DeckMotion, times: Array) -> None:
-        self.states = deck.states(times)
-        states, to_deck = self.states, model.to_deck
+    def __init__(self, scenario: Scenario, model: FrameModel, step: float, count: int) -> None:
+        self.states = deck_states(deck_coordinates(scenario, step, count))
+        states, crane, to_deck = self.states, scenario.crane, model.to_deck
         self.pulley_place, self.pulley_speed = _carried_point(states, np.array(crane.pulley_position))
         self.drum_place, self.drum_speed = _carried_point(states, np.array(crane.drum_position))
         self.rotation = states.rotation @ to_deck
         """{F} → base frame, (k, 3, 3)."""
-        gravity = np.array([0.0, 0.0, -GRAVITY])
+        gravity = np.array([0.0, 0.0, -scenario.gravity])
         self.field = np.einsum("kij,ki->kj", self.rotation, gravity - states.acceleration)
         self.spin = states.angular_velocity @ to_deck
         spin_up = states.angular_acceleration @ to_deck
@@ -158,27 +139,20 @@ def _carried_point(states: DeckStates, place: Array) -> tuple[Array, Array]:
 class _Run:
     """State and constants of one run; :func:`simulate` drives it."""
 
-    def __init__(self, crane: Crane, case: DynamicCase, model: FrameModel) -> None:
+    def __init__(self, case: DynamicCase, model: FrameModel) -> None:
         inner = max(1, math.ceil(case.output_interval / case.step - 1e-9))
-        self.crane, self.case, self.model, self.inner = crane, case, model, inner
+        self.case, self.model, self.inner = case, model, inner
+        self.scenario, self.crane = case.scenario, case.scenario.crane
         self.outputs = max(1, round(case.duration / case.output_interval))
         self.scheme = AverageAcceleration(model, case.output_interval / inner)
         self.times: Array = self.scheme.step * np.arange(self.outputs * inner + 1, dtype=np.float64)
-        self.carriage = _Carriage(crane, model, case.deck, self.times)
+        self.carriage = _Carriage(self.scenario, model, self.scheme.step, self.times.size)
         self.inertia = CarriedInertia(model)
         self.turned = (-1, np.zeros(0), np.zeros(0), np.zeros(0))
         self.uniform = model.uniform_field()
         self.reduced_uniform = (self.uniform.T @ model.constraints.basis).T
         self.coupling = self.scheme.pulley @ self.scheme.response
-        self.radius = crane.winch.drum_radius
-        static_length = crane.drum_to_pulley + crane.pulley_position[2] - case.required_height
-        if crane.pulley_position[2] - case.required_height <= 0.0:
-            raise InvalidValue(
-                f"required_height = {case.required_height} m: must be below the pulley, "
-                f"in (-inf, {crane.pulley_position[2]:g}) m"
-            )
-        strain = case.load_mass * GRAVITY / crane.rope.axial_stiffness
-        self.unstretched = static_length / (1.0 + strain)
+        self.radius, self.unstretched = self.crane.winch.drum_radius, self.scenario.free_length
         self.load, self.load_velocity, self.load_acceleration = (np.zeros(3) for _ in range(3))
         self.angle, self.rate, self.angular_acceleration = 0.0, 0.0, 0.0
         self.force = np.zeros(3)
@@ -188,7 +162,7 @@ class _Run:
     def start(self) -> None:
         """Static equilibrium with the deck level, carried to where the deck is at t = 0."""
         model, scheme, carriage = self.model, self.scheme, self.carriage
-        tension = self.case.load_mass * GRAVITY
+        tension = self.scenario.weight
         level = model.to_deck
         undeformed = np.array(self.crane.pulley_position)
         drum = np.array(self.crane.drum_position)
@@ -197,7 +171,7 @@ class _Run:
         for _ in range(50):
             to_drum = drum - undeformed - deflection
             force = tension * (to_drum / np.linalg.norm(to_drum) - np.array([0.0, 0.0, 1.0]))
-            position = solve(model, model.weight() + (level.T @ force) @ model.pulley)
+            position = solve(model, model.weight(self.scenario.gravity) + (level.T @ force) @ model.pulley)
             before, deflection = deflection, level @ model.pulley @ position
             if np.max(np.abs(deflection - before)) < 1e-13:
                 break
@@ -207,7 +181,7 @@ class _Run:
         states = carriage.states
         place = states.position[0] + states.rotation[0] @ (undeformed + deflection)
         self.load = place - np.array([0.0, 0.0, hanging])
-        if self.case.initial == "comoving":
+        if self.scenario.initial == "comoving":
             arm = np.cross(states.angular_velocity[0], undeformed + deflection)
             self.load_velocity = states.velocity[0] + states.rotation[0] @ arm
         if isinstance(self.case.drum, PrescribedDrum):
@@ -244,7 +218,7 @@ class _Run:
     def _evaluate(self, index: int, deflection: Array, deflection_rate: Array) -> None:
         """Rope force at S (along {F}), accelerations of load and drum, for the present state of load and
         drum."""
-        case, carriage = self.case, self.carriage
+        scenario, drum, carriage = self.scenario, self.case.drum, self.carriage
         turn = carriage.rotation[index]
         moving = deflection_rate
         if carriage.turns:
@@ -269,15 +243,15 @@ class _Run:
             unstretched=length,
             unstretched_rate=self.radius * self.rate,
             stiffness=self.crane.rope.axial_stiffness / length,
-            damping=case.rope_damping,
+            damping=scenario.rope_damping,
         )
         tension = self.rope.tension
         self.force = tension * np.array([lx + hx, ly + hy, lz + hz]) @ turn
-        pull = tension / case.load_mass
-        self.load_acceleration = np.array([-pull * lx, -pull * ly, -pull * lz - GRAVITY])
-        if isinstance(case.drum, DrivenDrum):
-            torque = case.drum.torque(float(self.times[index]), self.angle, self.rate)
-            self.angular_acceleration = (torque + self.pull(self.rope) * self.radius) / case.drum.inertia
+        pull = tension / scenario.load_mass
+        self.load_acceleration = np.array([-pull * lx, -pull * ly, -pull * lz - scenario.gravity])
+        if isinstance(drum, DrivenDrum):
+            torque = drum.torque(float(self.times[index]), self.angle, self.rate)
+            self.angular_acceleration = (torque + self.pull(self.rope) * self.radius) / drum.inertia
 
     def pull(self, rope: RopeForce) -> float:
         """Force of the rope on the drum: what leaves takes strain energy along, c = E_R F_R / l, eq. (25)."""
@@ -298,7 +272,7 @@ class _Run:
         place, speed = scheme.predict()
         acceleration = scheme.acceleration
         # c times the rounding of a length is some 1e-16 E_R F_R: ask for no more than that allows.
-        tolerance = 1e-11 * self.case.load_mass * GRAVITY + 1e-14 * self.crane.rope.axial_stiffness
+        tolerance = 1e-11 * self.scenario.weight + 1e-14 * self.crane.rope.axial_stiffness
         # Begin the iteration where force and load go on as they did in the last step.
         force, pulled = self.force, self.load_acceleration
         self.force = 2.0 * force - self.last_force
@@ -321,8 +295,9 @@ class _Run:
                 if float(abs(self.force - before).max()) <= tolerance:
                     break
             else:
-                raise ArithmeticError(
-                    f"rope force did not converge at t = {self.times[index]:.4f} s: take a smaller step"
+                raise InvalidValue(
+                    f"step = {self.case.step} s: must be smaller, as the rope's force did not converge at "
+                    f"t = {self.times[index]:.4f} s"
                 )
             latest = free + scheme.response @ self.force
             change = np.max(np.abs(latest - acceleration))
@@ -332,11 +307,10 @@ class _Run:
         scheme.finish(acceleration)
 
 
-def simulate(crane: Crane, case: DynamicCase | None = None, *, model: FrameModel | None = None) -> DynamicResult:
+def simulate(case: DynamicCase | None = None, *, model: FrameModel | None = None) -> DynamicResult:
     """Run the full model with rope, load and drum on a moving deck.
 
     Args:
-        crane: The crane; luffing angle and servomotor lengths stay as they are.
         case: What happens; default the paper's case with the drum still.
         model: The frame's model, if it is not to be the default one (10 and 8 elements).
 
@@ -344,13 +318,13 @@ def simulate(crane: Crane, case: DynamicCase | None = None, *, model: FrameModel
         SmallRotationWarning: An rfe turns by more than 0.05 rad.
 
     Raises:
-        ArithmeticError: The step is too long for the rope.
+        InvalidValue: The step is too long for the rope, or a recorded motion too short for the run.
     """
     what = case or DynamicCase()
-    frame = model or frame_model(crane.frame)
-    if frame.frame != crane.frame:
-        raise InvalidValue("model: must have been made of the crane's own frame")
-    run = _Run(crane, what, frame)
+    frame = model or frame_model(what.scenario.crane.frame)
+    if frame.frame != what.scenario.crane.frame:
+        raise InvalidValue("model: must have been made of the frame of the scenario's crane")
+    run = _Run(what, frame)
     run.start()
     count, size = run.outputs + 1, run.scheme.position.size
     states = np.zeros((count, 2, size))
@@ -375,10 +349,8 @@ def simulate(crane: Crane, case: DynamicCase | None = None, *, model: FrameModel
         for output in range(count):
             force[output] -= run.inertial(output * run.inner, *full[output])
     frame.warn_of_rotation(full[:, 0])
-    deck = run.carriage.states
     return DynamicResult(
         case=what,
-        crane=crane,
         frame=FrameHistory(
             model=frame,
             time=run.times[kept],
@@ -394,13 +366,5 @@ def simulate(crane: Crane, case: DynamicCase | None = None, *, model: FrameModel
         stretch=body[:, 8],
         drum_angle=body[:, 9],
         drum_rate=body[:, 10],
-        deck=DeckStates(
-            position=deck.position[kept],
-            velocity=deck.velocity[kept],
-            acceleration=deck.acceleration[kept],
-            rotation=deck.rotation[kept],
-            angular_velocity=deck.angular_velocity[kept],
-            angular_acceleration=deck.angular_acceleration[kept],
-        ),
-        unstretched=run.unstretched,
+        deck=run.carriage.states.every(run.inner),
     )

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
-from aframe_env.crane import GRAVITY
 from aframe_env.dynamics.rfem.beam import Array
 from aframe_env.dynamics.rfem.constraints import servomotor_direction
 from aframe_env.dynamics.rfem.dynamics import DrivenDrum, DynamicResult
@@ -42,7 +41,8 @@ def energy_balance(result: DynamicResult) -> EnergyBalance:
     Raises:
         InvalidValue: The output interval is longer than the step.
     """
-    case, history, crane = result.case, result.frame, result.crane
+    case, history = result.case, result.frame
+    scenario, crane = case.scenario, case.scenario.crane
     if case.output_interval > case.step * (1.0 + 1e-9):
         raise InvalidValue(
             f"output_interval = {case.output_interval} s: must be the step, {case.step} s, for a balance"
@@ -52,8 +52,8 @@ def energy_balance(result: DynamicResult) -> EnergyBalance:
     spin = deck.angular_velocity @ model.to_deck
     carried = np.einsum("kij,ki->kj", to_frame, deck.velocity)
 
-    kinetic = 0.5 * case.load_mass * np.sum(result.load_velocity**2, axis=1)
-    potential = case.load_mass * GRAVITY * result.load[:, 2]
+    kinetic = 0.5 * scenario.load_mass * np.sum(result.load_velocity**2, axis=1)
+    potential = scenario.weight * result.load[:, 2]
     for index, body in enumerate(model.structure.bodies):
         own = slice(6 * index, 6 * index + 6)
         shift = history.position[:, own][:, :3] @ body.axes.T
@@ -63,9 +63,9 @@ def energy_balance(result: DynamicResult) -> EnergyBalance:
         turning = spin @ body.axes + rates[:, 3:]
         kinetic += 0.5 * body.mass * np.sum(speed**2, axis=1) + 0.5 * turning**2 @ body.inertia
         place = deck.position[:, 2] + np.einsum("kj,kj->k", to_frame[:, 2], arm)
-        potential += body.mass * GRAVITY * place
+        potential += body.mass * scenario.gravity * place
     strain = 0.5 * np.einsum("ki,ki->k", history.position @ model.stiffness, history.position)
-    length = result.unstretched + crane.winch.drum_radius * result.drum_angle
+    length = scenario.free_length + crane.winch.drum_radius * result.drum_angle
     strain += 0.5 * result.elastic_tension**2 * length / crane.rope.axial_stiffness
     loss = np.einsum("ki,ki->k", history.velocity @ model.damping, history.velocity)
 

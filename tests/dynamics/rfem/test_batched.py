@@ -10,12 +10,10 @@ import pytest
 from aframe_env.crane import Crane
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.flexible import layout as flex
-from aframe_env.dynamics.flexible.deck import turn
 from aframe_env.dynamics.flexible.readout import FEET, SERVOMOTORS, UTILISATION
 from aframe_env.dynamics.flexible.reduction import modal_frame
 from aframe_env.dynamics.flexible.tables import couples, newmark_beta
 from aframe_env.dynamics.rfem.chain import Division
-from aframe_env.dynamics.rfem.deck import DeckHarmonic, HarmonicDeck
 from aframe_env.dynamics.rfem.dynamics import DynamicCase, DynamicResult, simulate
 from aframe_env.dynamics.rfem.model import frame_model
 from aframe_env.dynamics.rfem.reference import time_series
@@ -40,15 +38,6 @@ def crane_of(material: Material | None = None, servomotor: Servomotor | None = N
 
 def stiff(factor: float) -> Crane:
     return crane_of(Material(young_modulus=2.1e11 * factor, shear_modulus=8.1e10 * factor))
-
-
-def motion_of(deck: HarmonicDeck) -> HarmonicMotion:
-    return HarmonicMotion(
-        harmonics=tuple(
-            Harmonic(coordinate=item.direction, amplitude=item.amplitude, period=item.period, phase=item.phase)
-            for item in deck.components
-        )
-    )
 
 
 def run(scenario, duration, mesh, step=None, command=0.0):
@@ -82,26 +71,25 @@ def assert_like(result: DynamicResult, run_of_engine, load: float, share: float)
 
 @pytest.mark.parametrize("modes", [None, 8])
 def test_paper_case_is_that_of_the_full_model(modes):
-    expected = simulate(Crane(), DynamicCase(duration=5.0, step=2.5e-3), model=frame_model(Crane().frame, COARSE))
+    expected = simulate(DynamicCase(duration=5.0, step=2.5e-3), model=frame_model(Crane().frame, COARSE))
     assert_like(expected, run(Scenario.paper(), 5.0, Mesh(COARSE, modes)), 1e-6, 0.01)
 
 
 def test_rough_sea_is_that_of_the_full_model():
     # Damped: a sudden start makes an undamped frame ring, and no coarse step gets the ringing's phase right.
     crane = crane_of(Material(normal_damping=2.1e9, tangential_damping=8.1e8))
-    sea = run_checks.rough_sea()
-    case = DynamicCase(deck=sea, duration=3.0, step=2.5e-3, initial="rest", rope_damping=2e4)
-    expected = simulate(crane, case, model=frame_model(crane.frame, COARSE))
-    scenario = Scenario.paper(initial="rest", rope_damping=2e4, motion=motion_of(sea), crane=crane)
+    scenario = Scenario.paper(initial="rest", rope_damping=2e4, motion=run_checks.rough_sea(), crane=crane)
+    case = DynamicCase(scenario=scenario, duration=3.0, step=2.5e-3)
+    expected = simulate(case, model=frame_model(crane.frame, COARSE))
     assert_like(expected, run(scenario, 3.0, Mesh(COARSE), 2.5e-3), 1e-5, 0.005)
 
 
 def test_a_deck_that_turns_fast_moves_the_displaced_frame_too():
     # So fast that the terms of the displacement count: without them the error is some ten times the bound.
-    deck = HarmonicDeck((DeckHarmonic(direction="roll", amplitude=0.4, period=2.0),))
-    case = DynamicCase(deck=deck, duration=2.0, step=1e-3, initial="rest")
-    expected = simulate(Crane(), case, model=frame_model(Crane().frame, COARSE))
-    scenario = Scenario.paper(initial="rest", motion=motion_of(deck))
+    roll = HarmonicMotion(harmonics=(Harmonic(coordinate="roll", amplitude=0.4, period=2.0),))
+    scenario = Scenario.paper(initial="rest", motion=roll)
+    case = DynamicCase(scenario=scenario, duration=2.0, step=1e-3)
+    expected = simulate(case, model=frame_model(Crane().frame, COARSE))
     _, _, readout = run(scenario, 2.0, Mesh(COARSE), 2e-3)
     error = np.abs(readout - readout_of(expected)).max(axis=0)
     assert (error[:3] < 2e-3 * np.ptp(readout_of(expected)[:, 1])).all()
@@ -110,9 +98,9 @@ def test_a_deck_that_turns_fast_moves_the_displaced_frame_too():
 def test_damping_that_couples_the_modes():
     crane = crane_of(Material(normal_damping=2.1e9, tangential_damping=5e7), Servomotor(stiffness=3e8, damping=2e5))
     assert couples(modal_frame(crane.frame, COARSE, None))
-    case = DynamicCase(duration=3.0, step=2.5e-3, initial="rest")
-    expected = simulate(crane, case, model=frame_model(crane.frame, COARSE))
     scenario = Scenario.paper(initial="rest", crane=crane)
+    case = DynamicCase(scenario=scenario, duration=3.0, step=2.5e-3)
+    expected = simulate(case, model=frame_model(crane.frame, COARSE))
     assert_like(expected, run(scenario, 3.0, Mesh(COARSE), 2.5e-3), 1e-5, 0.01)
     assert_like(expected, run(scenario, 3.0, Mesh(COARSE, 20), 2.5e-3), 1e-4, 0.01)
 
@@ -120,10 +108,10 @@ def test_damping_that_couples_the_modes():
 def test_damping_in_the_ratio_of_the_moduli_does_not_couple_them():
     crane = crane_of(Material(normal_damping=2.1e8, tangential_damping=8.1e7))
     assert not couples(modal_frame(crane.frame, COARSE, None))
-    expected = simulate(
-        crane, DynamicCase(duration=2.0, step=2.5e-3, initial="rest"), model=frame_model(crane.frame, COARSE)
-    )
-    assert_like(expected, run(Scenario.paper(initial="rest", crane=crane), 2.0, Mesh(COARSE), 2.5e-3), 1e-5, 0.01)
+    scenario = Scenario.paper(initial="rest", crane=crane)
+    case = DynamicCase(scenario=scenario, duration=2.0, step=2.5e-3)
+    expected = simulate(case, model=frame_model(crane.frame, COARSE))
+    assert_like(expected, run(scenario, 2.0, Mesh(COARSE), 2.5e-3), 1e-5, 0.01)
 
 
 def test_paper_case_against_the_independent_program():
@@ -146,7 +134,7 @@ def test_stiff_frame_is_the_simplified_model():
 
 
 def test_reduced_frame_is_the_full_one():
-    scenario = Scenario.paper(motion=motion_of(run_checks.rough_sea()), ramp=10.0)
+    scenario = Scenario.paper(motion=run_checks.rough_sea(), ramp=10.0)
     full, reduced = (run(scenario, 30.0, Mesh(Division(), modes)) for modes in (None, 5))
     assert np.abs(full[0] - reduced[0]).max() < 1e-3 * np.ptp(full[0][:, 2])
     error, scale = np.abs(full[2] - reduced[2]).max(axis=0), np.ptp(full[2], axis=0)
@@ -200,22 +188,3 @@ def test_newmark_beta_gives_each_mode_its_own_frequency():
     turned = 2.0 * np.arcsin(np.sqrt(0.25 * x**2 / (1.0 + beta * x**2)))
     assert turned == pytest.approx(x, rel=1e-9)
     assert newmark_beta(np.array([101.0**2]), step)[0] == 0.25
-
-
-def test_deck_turns_as_in_the_stand_alone_runs():
-    deck = HarmonicDeck(
-        tuple(
-            DeckHarmonic(direction=direction, amplitude=0.3, period=period)
-            for direction, period in (("roll", 4.0), ("pitch", 5.0), ("yaw", 7.0))
-        )
-    )
-    expected = deck.states(np.array([1.3]))
-    values = np.zeros((3, 3))
-    for k, period in enumerate((4.0, 5.0, 7.0)):
-        rate = 2.0 * np.pi / period
-        angle = rate * 1.3
-        values[:, k] = 0.3 * np.sin(angle), 0.3 * rate * np.cos(angle), -0.3 * rate**2 * np.sin(angle)
-    rotation, spin, spin_up = turn(*values.ravel())
-    assert np.reshape(rotation, (3, 3)) == pytest.approx(expected.rotation[0], abs=1e-14)
-    assert spin == pytest.approx(expected.angular_velocity[0], abs=1e-14)
-    assert spin_up == pytest.approx(expected.angular_acceleration[0], abs=1e-14)

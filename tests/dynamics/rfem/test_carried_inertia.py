@@ -2,20 +2,25 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from aframe_env.crane import Crane
-from aframe_env.dynamics.rfem.deck import DeckHarmonic, HarmonicDeck, paper_motion
+from aframe_env.dynamics.rfem.deck import deck_coordinates, deck_states
 from aframe_env.dynamics.rfem.dynamics import DynamicCase, simulate
 from aframe_env.dynamics.rfem.model import CarriedInertia, apply_blocks
+from aframe_env.motion import Harmonic, HarmonicMotion
+from aframe_env.record import RecordedMotion
+from aframe_env.scenario import Scenario
+from aframe_env.validation import InvalidValue
 from train.verification.frame_checks import model
 
-TURNING = HarmonicDeck(
-    (
-        *paper_motion().components,
-        DeckHarmonic(direction="sway", amplitude=0.7, period=7.0, phase=0.4),
-        DeckHarmonic(direction="roll", amplitude=0.3, period=5.0, phase=0.3),
-        DeckHarmonic(direction="pitch", amplitude=0.2, period=4.0, phase=1.0),
-        DeckHarmonic(direction="yaw", amplitude=0.4, period=6.0, phase=-0.7),
+TURNING = HarmonicMotion(
+    harmonics=(
+        *HarmonicMotion.paper().harmonics,
+        Harmonic(coordinate="sway", amplitude=0.7, period=7.0, phase=0.4),
+        Harmonic(coordinate="roll", amplitude=0.3, period=5.0, phase=0.3),
+        Harmonic(coordinate="pitch", amplitude=0.2, period=4.0, phase=1.0),
+        Harmonic(coordinate="yaw", amplitude=0.4, period=6.0, phase=-0.7),
     )
 )
 
@@ -23,13 +28,45 @@ TURNING = HarmonicDeck(
 def test_deck_derivatives():
     step = 1e-4
     times = 3.3 + step * np.arange(-2, 3)
-    states = TURNING.states(times)
+    states = deck_states(TURNING.components().at(times))
     slope = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / (12 * step)
     for value, rate in (("position", "velocity"), ("velocity", "acceleration")):
         assert slope @ getattr(states, value) == pytest.approx(getattr(states, rate)[2], abs=1e-9)
     assert slope @ states.angular_velocity == pytest.approx(states.angular_acceleration[2], abs=1e-9)
     spin = states.rotation[2].T @ np.einsum("k,kij->ij", slope, states.rotation)
     assert [spin[2, 1], spin[0, 2], spin[1, 0]] == pytest.approx(states.angular_velocity[2], abs=1e-9)
+
+
+def test_deck_turns_by_yaw_then_pitch_then_roll():
+    coordinates = TURNING.components().at([1.3, 4.0])
+    expected = Rotation.from_euler("ZYX", coordinates[0][:, :2:-1]).as_matrix()
+    assert deck_states(coordinates).rotation == pytest.approx(expected, abs=1e-14)
+
+
+@pytest.mark.parametrize("recorded", [False, True])
+def test_deck_follows_the_ship_with_its_ramp(recorded):
+    # Ramp and motion as a polynomial and a sine, multiplied out by differentiating their product.
+    step, ramp = 0.01, 4.0
+    times = step * np.arange(601)
+    motion = HarmonicMotion(harmonics=(Harmonic(coordinate="pitch", amplitude=0.2, period=3.0, phase=0.4),))
+    if recorded:
+        samples = 0.1 * np.arange(61)
+        motion = RecordedMotion(times=samples, coordinates=motion.components().at(samples)[0])
+    s = np.minimum(times / ramp, 1.0)
+    rate = 2.0 * np.pi / 3.0
+    built, part = s**3 * (10.0 - 15.0 * s + 6.0 * s**2), 0.2 * np.sin(rate * times + 0.4)
+    place, speed, acceleration = deck_coordinates(Scenario(motion=motion, ramp=ramp), step, times.size)
+    assert place[:, 4] == pytest.approx(built * part, abs=1e-6)
+    assert np.gradient(place[:, 4], step)[1:-1] == pytest.approx(speed[1:-1, 4], abs=5e-5)
+    assert np.gradient(speed[:, 4], step)[1:-1] == pytest.approx(acceleration[1:-1, 4], abs=5e-4)
+    assert not np.delete(place, 4, axis=1).any()
+
+
+def test_record_that_is_too_short_is_named():
+    times = 0.1 * np.arange(61)
+    motion = RecordedMotion(times=times, coordinates=np.zeros((61, 6)))
+    with pytest.raises(InvalidValue, match=r"duration = 7 s: must be in \(0, 6\] s"):
+        simulate(DynamicCase(scenario=Scenario(motion=motion), duration=7.0))
 
 
 def test_inertial_terms_equal_those_of_point_masses():
@@ -43,7 +80,7 @@ def test_inertial_terms_equal_those_of_point_masses():
 
     step, now = 2e-3, 2.1
     offsets = np.arange(-2, 3)
-    states = TURNING.states(now + step * offsets)
+    states = deck_states(TURNING.components().at(now + step * offsets))
     second = np.array([-1.0, 16.0, -30.0, 16.0, -1.0]) / (12 * step**2)
     expected = np.zeros(size)
     for index, body in enumerate(frame.structure.bodies):
@@ -83,9 +120,10 @@ def test_inertial_terms_equal_those_of_point_masses():
 
 def test_reactions_on_a_turning_deck_carry_the_frame():
     # Feet, servomotors and rope together give the frame's change of momentum and its weight.
-    case = DynamicCase(deck=TURNING, load_mass=1e3, duration=3.0, step=0.01, output_interval=0.01)
+    scenario = Scenario.paper(motion=TURNING, load_mass=1e3)
+    case = DynamicCase(scenario=scenario, duration=3.0, step=0.01, output_interval=0.01)
     frame = model(5, 2)
-    result = simulate(Crane(), case, model=frame)
+    result = simulate(case, model=frame)
     momentum = np.zeros((result.time.size, 3))
     history, deck = result.frame, result.deck
     for index, body in enumerate(frame.structure.bodies):

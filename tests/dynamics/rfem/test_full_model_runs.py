@@ -5,18 +5,21 @@ import numpy as np
 import pytest
 
 from aframe_env.crane import Crane
-from aframe_env.dynamics.rfem.deck import DeckHarmonic, HarmonicDeck
 from aframe_env.dynamics.rfem.dynamics import DrivenDrum, DynamicCase, PrescribedDrum, simulate
 from aframe_env.dynamics.rfem.energy import energy_balance
 from aframe_env.dynamics.rfem.model import frame_model
 from aframe_env.dynamics.rfem.reference import time_series
 from aframe_env.dynamics.rfem.release import release
 from aframe_env.dynamics.rfem.rope_law import rope_force
+from aframe_env.motion import Harmonic, HarmonicMotion
+from aframe_env.scenario import Scenario
 from aframe_env.section import Material, Servomotor
 from aframe_env.validation import InvalidValue
 from train.verification import run_checks
 from train.verification.cases import columns_of
 from train.verification.frame_checks import CASES, model, order
+
+STILL = Scenario.paper(motion=HarmonicMotion())
 
 
 def test_paper_case_against_the_independent_program():
@@ -57,19 +60,21 @@ def test_stiff_frame_moves_the_load_as_a_rigid_one():
     frame = Crane().frame
     material = replace(frame.structure.material, young_modulus=2.1e14, shear_modulus=8.1e13)
     stiff = replace(frame, structure=replace(frame.structure, material=material))
-    result = simulate(Crane(frame=stiff), DynamicCase(step=1e-3, duration=30.0), model=frame_model(stiff))
+    scenario = Scenario.paper(crane=Crane(frame=stiff))
+    result = simulate(DynamicCase(scenario=scenario, step=1e-3, duration=30.0))
     rigid = time_series("paper_rigid")["xL3_m"][: result.time.size]
     assert np.abs(result.load[:, 2] - rigid).max() <= 1e-4
 
 
-def _balance(crane, **case):
+def _balance(scenario, **case):
     step = 2.5e-3
-    settings = {"duration": 10.0, "step": step, "output_interval": step} | case
-    return energy_balance(simulate(crane, DynamicCase(**settings), model=frame_model(crane.frame)))
+    return energy_balance(
+        simulate(DynamicCase(scenario=scenario, duration=10.0, step=step, output_interval=step, **case))
+    )
 
 
 def test_energy_balance_with_the_drum_still():
-    balance = _balance(Crane(), initial="rest")
+    balance = _balance(Scenario.paper("rest"))
     assert balance.error < 1e-5
     assert np.ptp(balance.input) > 1e6
     assert balance.dissipated[-1] == 0.0
@@ -82,24 +87,25 @@ def test_energy_balance_with_losses_everywhere():
         material=Material(normal_damping=2.1e8, tangential_damping=5e7),
         servomotor=Servomotor(stiffness=3e8, damping=2e5),
     )
-    balance = _balance(Crane(frame=replace(frame, structure=made)), initial="rest", rope_damping=5e4)
+    crane = Crane(frame=replace(frame, structure=made))
+    balance = _balance(Scenario.paper("rest", rope_damping=5e4, crane=crane))
     assert balance.error < 1e-5
     assert balance.dissipated[-1] > 1e3
 
 
 def test_energy_balance_with_a_prescribed_drum():
     drum = PrescribedDrum(angle=lambda t: 1.5 * (1.0 - math.cos(0.7 * t)), rate=lambda t: 1.05 * math.sin(0.7 * t))
-    assert _balance(Crane(), drum=drum).error < 1e-5
+    assert _balance(Scenario.paper(), drum=drum).error < 1e-5
 
 
 def test_energy_balance_with_a_driven_drum():
     drum = DrivenDrum(inertia=5e4, torque=lambda t, a, w: -0.75 * 981e3 * (1 + 0.1 * math.sin(t)) - 2e5 * w - 1e5 * a)
-    assert _balance(Crane(), drum=drum).error < 1e-5
+    assert _balance(Scenario.paper(), drum=drum).error < 1e-5
 
 
 def test_halving_the_step_is_second_order():
     runs = [
-        simulate(Crane(), DynamicCase(step=h, duration=10.0, output_interval=0.1), model=model(5, 2)).load[:, 2]
+        simulate(DynamicCase(step=h, duration=10.0, output_interval=0.1), model=model(5, 2)).load[:, 2]
         for h in (0.02, 0.01, 0.005)
     ]
     gaps = [np.abs(a - b).max() for a, b in ((runs[0], runs[1]), (runs[1], runs[2]))]
@@ -107,7 +113,7 @@ def test_halving_the_step_is_second_order():
 
 
 def test_without_motion_nothing_moves():
-    result = simulate(Crane(), DynamicCase(deck=HarmonicDeck(), duration=2.0, step=5e-3))
+    result = simulate(DynamicCase(scenario=STILL, duration=2.0, step=5e-3))
     assert np.abs(result.load - result.load[0]).max() < 1e-7
     assert result.tension == pytest.approx(981e3, rel=1e-8)
     pulley = result.frame.displacement("S")
@@ -116,29 +122,29 @@ def test_without_motion_nothing_moves():
 
 def test_drum_pays_out_with_positive_angle():
     drum = PrescribedDrum(angle=lambda t: 0.5 * t, rate=lambda t: 0.5)
-    result = simulate(Crane(), DynamicCase(deck=HarmonicDeck(), drum=drum, duration=4.0, step=5e-3))
+    result = simulate(DynamicCase(scenario=STILL, drum=drum, duration=4.0, step=5e-3))
     assert result.load[-1, 2] < result.load[0, 2] - 0.5
 
 
 def test_rope_goes_slack_and_never_pushes():
-    deck = HarmonicDeck((DeckHarmonic(direction="heave", amplitude=4.0, period=4.5),))
-    case = DynamicCase(deck=deck, duration=10.0, step=2.5e-3, rope_damping=2e4)
-    result = simulate(Crane(), case, model=model(5, 2))
+    heave = HarmonicMotion(harmonics=(Harmonic(coordinate="heave", amplitude=4.0, period=4.5),))
+    scenario = Scenario.paper(motion=heave, rope_damping=2e4)
+    result = simulate(DynamicCase(scenario=scenario, duration=10.0, step=2.5e-3), model=model(5, 2))
     assert result.tension.min() == 0.0
     assert result.tension.max() > 2e6
     assert np.isfinite(result.load).all()
 
 
 def test_feet_and_cylinders_do_not_drift():
-    case = DynamicCase(deck=run_checks.rough_sea(), duration=20.0, step=0.02, output_interval=0.1)
-    result = simulate(Crane(), case, model=model(5, 2))
+    scenario = Scenario.paper(motion=run_checks.rough_sea())
+    result = simulate(DynamicCase(scenario=scenario, duration=20.0, step=0.02, output_interval=0.1), model=model(5, 2))
     assert result.frame.constraint_violation() < 1e-12
     assert np.ptp(result.frame.displacement("S")[:, 2]) > 1e-4
 
 
 def test_stress_follows_the_static_one():
     frame = model(20, 16)
-    result = simulate(Crane(), DynamicCase(deck=HarmonicDeck(), duration=0.1, step=5e-3), model=frame)
+    result = simulate(DynamicCase(scenario=STILL, duration=0.1, step=5e-3), model=frame)
     peak = max(station.von_mises for station in Crane().static(CASES["L1"], model=frame).along())
     assert result.frame.von_mises()[0].max() == pytest.approx(peak, rel=0.1)
 
@@ -156,9 +162,9 @@ def test_rope_law():
 
 
 def test_bad_input_is_named():
-    with pytest.raises(InvalidValue, match=r"initial.*'rest'"):
-        DynamicCase(initial="falling")
-    with pytest.raises(InvalidValue, match="required_height"):
-        simulate(Crane(), DynamicCase(required_height=20.0, duration=0.1))
+    with pytest.raises(InvalidValue, match=r"output_interval.*\(0, 1\] s"):
+        DynamicCase(duration=1.0, output_interval=2.0)
+    with pytest.raises(InvalidValue, match=r"step = 0.5 s: must be smaller"):
+        simulate(DynamicCase(scenario=Scenario(load_mass=100.0), step=0.5, output_interval=0.5), model=model(5, 2))
     with pytest.raises(InvalidValue, match="frame"):
-        simulate(Crane(frame=replace(Crane().frame, height=13.0)), model=model(5, 2))
+        simulate(model=frame_model(replace(Crane().frame, height=13.0)))
