@@ -73,6 +73,21 @@ def test_any_scenario_from_a_file(tmp_path, monkeypatch):
     assert "differs from the source" not in (out / "notes.md").read_text(encoding="utf-8")
 
 
+def test_drives_hold_the_load_in_the_full_model_too(tmp_path, monkeypatch):
+    path, out = tmp_path / "paper.toml", tmp_path / "out"
+    path.write_text(scenario_text(drives.paper_case()))
+    arguments = ("--drive", "harmonic", "--objective", "omega1", "--duration", 14, "--out", out)
+    assert command(monkeypatch, "--scenario", path, "--check", "rfem", *arguments) == 0
+    still, harmonic = json.loads((out / "summary.json").read_text())
+    assert still["swing_rfem"] > 2.0
+    assert harmonic["swing_rfem"] < 0.01
+    # The frame sags by some centimetres under 100 t: no drive of the simplified model knows.
+    assert 0.02 < harmonic["amplitude_rfem"] < 0.05
+    assert harmonic["omega1_rfem"] <= 14.0 * harmonic["amplitude_rfem"] ** 2
+    assert (out / "full_model.png").read_bytes().startswith(b"\x89PNG")
+    assert "in the full model" in (out / "notes.md").read_text(encoding="utf-8")
+
+
 def test_the_same_seed_gives_the_same_drives(tmp_path, monkeypatch):
     texts = []
     for name in ("a", "b"):
