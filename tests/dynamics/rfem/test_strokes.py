@@ -21,7 +21,7 @@ from train.verification import run_checks
 from train.verification.frame_checks import model
 
 LIGHT = Scenario.paper(motion=HarmonicMotion(), load_mass=500.0)
-STRAIN = 20e-3
+STROKE = 20e-3
 """m; with the other servomotor held it twists the frame."""
 
 
@@ -50,16 +50,16 @@ def test_equal_strokes_luff_the_frame_as_a_rigid_body(layout):
 def test_slow_stroke_ends_in_the_static_solution():
     # Held against the saddle-point system of (23)-(30), solved as it stands.
     frame = model(5, 2)
-    strokes = (Stroke.smooth(STRAIN, 4.0), Stroke.smooth(0.0, 1.0))
+    strokes = (Stroke.smooth(STROKE, 4.0), Stroke.smooth(0.0, 1.0))
     history = simulate(DynamicCase(scenario=LIGHT, strokes=strokes, duration=5.0, step=5e-3), model=frame).frame
     matrix, size = frame.constraints.matrix, frame.structure.size
     system = np.block([[frame.stiffness, -matrix.T], [matrix, np.zeros((len(matrix),) * 2)]])
     scale = np.concatenate([np.full(size, 1e-4), np.full(len(matrix), 1e4)])
     target = np.zeros(len(matrix))
-    target[0] = -STRAIN
+    target[0] = -STROKE
     right = np.concatenate([history.force[-1], target])
     expected = scale * np.linalg.solve(scale[:, None] * system * scale, scale * right)
-    assert history.position[-1] == pytest.approx(expected[:size], abs=1e-4 * STRAIN)
+    assert history.position[-1] == pytest.approx(expected[:size], abs=1e-4 * STROKE)
     assert history.reactions()[-1] == pytest.approx(expected[size:], abs=1e-3 * np.abs(expected[size:]).max())
     assert np.ptp(history.servomotors()[:, 0]) > 1e4
     assert history.constraint_violation() < 1e-12
@@ -72,7 +72,7 @@ def test_energy_balance_with_the_work_of_the_servomotors(sea):
     crane = Crane(frame=replace(frame, structure=lossy))
     motion = HarmonicMotion.paper() if sea else HarmonicMotion()
     scenario = Scenario.paper("rest", motion=motion, crane=crane)
-    strokes = (Stroke.smooth(STRAIN, 1.5), Stroke.smooth(-0.5 * STRAIN, 1.0))
+    strokes = (Stroke.smooth(STROKE, 1.5), Stroke.smooth(-0.5 * STROKE, 1.0))
     step = 2.5e-3
     case = DynamicCase(scenario=scenario, strokes=strokes, duration=4.0, step=step, output_interval=step)
     balance, held = (energy_balance(simulate(item)) for item in (case, replace(case, strokes=None)))
@@ -81,7 +81,7 @@ def test_energy_balance_with_the_work_of_the_servomotors(sea):
 
 
 def test_halving_the_step_is_second_order():
-    strokes = (Stroke.smooth(STRAIN, 1.0),) * 2
+    strokes = (Stroke.smooth(STROKE, 1.0),) * 2
     scenario = Scenario.paper(motion=run_checks.rough_sea(), rope_damping=2e4)
     runs = [
         simulate(DynamicCase(scenario=scenario, strokes=strokes, duration=2.0, step=step), model=model(3, 2)).load
@@ -93,9 +93,9 @@ def test_halving_the_step_is_second_order():
 
 def test_smooth_stroke():
     times = np.linspace(0.0, 3.0, 3001)
-    change, rate, acceleration = strokes_at((Stroke.smooth(STRAIN, 2.0), Stroke.smooth(0.0, 1.0)), times)
+    change, rate, acceleration = strokes_at((Stroke.smooth(STROKE, 2.0), Stroke.smooth(0.0, 1.0)), times)
     assert change[0] == pytest.approx([0.0, 0.0])
-    assert change[-1] == pytest.approx([STRAIN, 0.0])
+    assert change[-1] == pytest.approx([STROKE, 0.0])
     assert np.gradient(change[:, 0], times)[1:-1] == pytest.approx(rate[1:-1, 0], abs=1e-6)
     assert np.gradient(rate[:, 0], times)[1:-1] == pytest.approx(acceleration[1:-1, 0], abs=1e-4)
 
