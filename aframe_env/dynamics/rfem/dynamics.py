@@ -159,7 +159,6 @@ class _Run:
         driving = np.hstack([self.uniform, -model.stiffness @ given, -model.damping @ given])
         self.driving = np.ascontiguousarray(model.constraints.basis.T @ driving)
         self.driven_by = np.hstack([self.carriage.field, self.stroke[0], self.stroke[1]])
-        self.lifted, self.lifting, _ = self.stroke @ (model.pulley @ given).T
         self.coupling = self.scheme.pulley @ self.scheme.response
         self.radius, self.unstretched = self.crane.winch.drum_radius, self.scenario.free_length
         self.load, self.load_velocity, self.load_acceleration = (np.zeros(3) for _ in range(3))
@@ -197,7 +196,7 @@ class _Run:
         if isinstance(self.case.drum, PrescribedDrum):
             self.angle, self.rate = self.case.drum.angle(0.0), self.case.drum.rate(0.0)
         at_rest = (position * model.mass) @ model.constraints.basis
-        self._evaluate(0, scheme.pulley @ at_rest + self.lifted[0], self.lifting[0])
+        self._evaluate(0, scheme.pulley @ at_rest, np.zeros(3))
         self.last_force, self.last_acceleration = self.force, self.load_acceleration
         loads = self._carried(0, at_rest, np.zeros_like(at_rest)) + self.force @ scheme.pulley
         scheme.start(at_rest, np.zeros_like(at_rest), loads)
@@ -293,8 +292,8 @@ class _Run:
         for _ in range(30 if self.carriage.turns else 1):
             free = scheme.solve(self._carried(index, *scheme.ends(acceleration)))
             own = scheme.pulley @ free
-            base = self.lifted[index] + scheme.pulley @ place + quarter * own
-            base_rate = self.lifting[index] + scheme.pulley @ speed + half * own
+            base = scheme.pulley @ place + quarter * own
+            base_rate = scheme.pulley @ speed + half * own
             for _ in range(60):
                 answer = self.coupling @ self.force
                 before = self.force

@@ -82,7 +82,10 @@ class FrameModel:
 
     @cached_property
     def lengthening(self) -> Array:
-        """(n, 2): share P b of q for S_R or S_L longer by 1 m; zero where they are elastic."""
+        """(n, 2): share P b of q for S_R or S_L longer by 1 m; zero where they are elastic.
+
+        It moves only the rfes that constraints touch, so never that of S.
+        """
         if self.frame.structure.servomotor.stiffness is not None:
             return np.zeros((self.structure.size, 2))
         return -self.constraints.particular[:, :2]

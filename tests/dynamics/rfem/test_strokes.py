@@ -33,8 +33,9 @@ def length(angle):
 
 
 @pytest.mark.parametrize("layout", ["one_chain", "three_beams"])
-def test_equal_strokes_luff_the_frame_as_a_rigid_body(layout):
-    frame = frame_model(Crane().frame, Division(leg=5, beam=2), layout=layout)
+@pytest.mark.parametrize("leg", [1, 5])
+def test_equal_strokes_luff_the_frame_as_a_rigid_body(layout, leg):
+    frame = frame_model(Crane().frame, Division(leg=leg, beam=2), layout=layout)
     angle, turned = frame.frame.luffing_angle, 1e-5
     stroke = length(angle + turned) - length(angle - turned)
     moved = solve(frame, np.zeros(frame.structure.size), np.full(2, stroke))
@@ -45,6 +46,7 @@ def test_equal_strokes_luff_the_frame_as_a_rigid_body(layout):
         assert found == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
     assert np.abs(frame.deformation @ moved).max() < 1e-12 * stroke
     assert np.abs(frame.stiffness @ moved).max() < 1.0
+    assert not (frame.pulley @ frame.lengthening).any()
 
 
 def test_slow_stroke_ends_in_the_static_solution():
@@ -71,15 +73,12 @@ def test_energy_balance_with_the_work_of_the_servomotors(sea):
     lossy = replace(frame.structure, material=Material(normal_damping=2.1e8, tangential_damping=5e7))
     crane = Crane(frame=replace(frame, structure=lossy))
     motion = HarmonicMotion.paper() if sea else HarmonicMotion()
-    scenario = Scenario.paper("rest", motion=motion, crane=crane, rope_damping=5e4)
+    scenario = Scenario.paper("rest", motion=motion, crane=crane)
     strokes = (Stroke.smooth(STROKE, 1.5), Stroke.smooth(-0.5 * STROKE, 1.0))
     step = 2.5e-3
     case = DynamicCase(scenario=scenario, strokes=strokes, duration=4.0, step=step, output_interval=step)
-    result = simulate(case)
-    balance, held = energy_balance(result), energy_balance(simulate(replace(case, strokes=None)))
+    balance, held = (energy_balance(simulate(item)) for item in (case, replace(case, strokes=None)))
     assert balance.error < 1e-5
-    damped = (result.tension - result.elastic_tension)[1:-1]
-    assert damped == pytest.approx(5e4 * np.gradient(result.stretch, step)[1:-1], abs=0.01 * np.abs(damped).max())
     assert np.abs(balance.input - held.input).max() > 1e3
 
 
