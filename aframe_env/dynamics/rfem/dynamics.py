@@ -22,6 +22,7 @@ from aframe_env.dynamics.rfem.integrator import AverageAcceleration
 from aframe_env.dynamics.rfem.model import CarriedInertia, FrameModel, apply_blocks, frame_model
 from aframe_env.dynamics.rfem.rope_law import RopeForce, rope_force
 from aframe_env.dynamics.rfem.statics import solve
+from aframe_env.dynamics.rfem.stroke import Stroke, strokes_at
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_number
 
@@ -62,10 +63,11 @@ class DynamicCase:
     """One dynamic run."""
 
     scenario: Scenario = field(default_factory=Scenario.paper)
-    """Crane, ship motion, load and rope; the load starts from static equilibrium. Luffing angle and servomotor
-    lengths stay as they are."""
+    """Crane, ship motion, load and rope; the load starts from static equilibrium. The luffing angle stays as it is."""
     drum: Drum = field(default_factory=StillDrum)
     """What the drum does."""
+    strokes: tuple[Stroke, Stroke] | None = None
+    """Prescribed change of the lengths of rigid servomotors S_R and S_L; None: none."""
     duration: float = 60.0
     """s."""
     step: float = 2.5e-3
@@ -79,6 +81,8 @@ class DynamicCase:
         require_number("output_interval", self.output_interval, "s", low=0.0, low_open=True)
         if self.output_interval > self.duration:
             raise InvalidValue(f"output_interval = {self.output_interval} s: must be in (0, {self.duration:g}] s")
+        if self.strokes is not None and self.scenario.crane.frame.structure.servomotor.stiffness is not None:
+            raise InvalidValue("strokes: must be None with elastic servomotors, as only rigid ones have a given length")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,7 +154,11 @@ class _Run:
         self.inertia = CarriedInertia(model)
         self.turned = (-1, np.zeros(0), np.zeros(0), np.zeros(0))
         self.uniform = model.uniform_field()
-        self.reduced_uniform = (self.uniform.T @ model.constraints.basis).T
+        self.stroke = strokes_at(case.strokes, self.times)
+        given = model.lengthening
+        driving = np.hstack([self.uniform, -model.stiffness @ given, -model.damping @ given])
+        self.driving = np.ascontiguousarray(model.constraints.basis.T @ driving)
+        self.driven_by = np.hstack([self.carriage.field, self.stroke[0], self.stroke[1]])
         self.coupling = self.scheme.pulley @ self.scheme.response
         self.radius, self.unstretched = self.crane.winch.drum_radius, self.scenario.free_length
         self.load, self.load_velocity, self.load_acceleration = (np.zeros(3) for _ in range(3))
@@ -171,7 +179,8 @@ class _Run:
         for _ in range(50):
             to_drum = drum - undeformed - deflection
             force = tension * (to_drum / np.linalg.norm(to_drum) - np.array([0.0, 0.0, 1.0]))
-            position = solve(model, model.weight(self.scenario.gravity) + (level.T @ force) @ model.pulley)
+            right = model.weight(self.scenario.gravity) + (level.T @ force) @ model.pulley
+            position = solve(model, right, self.stroke[0, 0])
             before, deflection = deflection, level @ model.pulley @ position
             if np.max(np.abs(deflection - before)) < 1e-13:
                 break
@@ -193,13 +202,15 @@ class _Run:
         scheme.start(at_rest, np.zeros_like(at_rest), loads)
 
     def _carried(self, index: int, position: Array, velocity: Array) -> Array:
-        """Weight and inertial terms of the deck's motion on the free coordinates."""
-        carriage, basis = self.carriage, self.model.constraints.basis
-        force = self.reduced_uniform @ carriage.field[index]
-        if not carriage.turns:
+        """What the free coordinates feel of weight, the deck's motion (its inertial terms) and the servomotors'
+        (−K P b − L P ḃ; P is M-orthogonal to Z, so that b̈ drops out), (n_z,)."""
+        force = self.driving @ self.driven_by[index]
+        if not self.carriage.turns:
             return np.asarray(force)
-        full = self.inertial(index, basis @ position, basis @ velocity)
-        return np.asarray(force - full @ basis)
+        basis, given = self.model.constraints.basis, self.model.lengthening
+        place = basis @ position + given @ self.stroke[0, index]
+        rate = basis @ velocity + given @ self.stroke[1, index]
+        return np.asarray(force - self.inertial(index, place, rate) @ basis)
 
     def inertial(self, index: int, position: Array, velocity: Array) -> Array:
         """e_F of a turning deck beyond the uniform field, (n,)."""
@@ -344,6 +355,8 @@ def simulate(case: DynamicCase | None = None, *, model: FrameModel | None = None
 
     kept = slice(0, None, run.inner)
     full = states @ frame.constraints.basis.T
+    stroke = run.stroke[:, kept]
+    full += (stroke[:2] @ frame.lengthening.T).transpose(1, 0, 2)
     force = run.carriage.field[kept] @ run.uniform.T + forces @ frame.pulley
     if run.carriage.turns:
         for output in range(count):
@@ -358,6 +371,7 @@ def simulate(case: DynamicCase | None = None, *, model: FrameModel | None = None
             velocity=full[:, 1],
             force=force,
             field=run.carriage.field[kept],
+            stroke=None if what.strokes is None else stroke,
         ),
         load=body[:, :3],
         load_velocity=body[:, 3:6],

@@ -20,7 +20,8 @@ class EnergyBalance:
     stored: Array
     """Kinetic, potential and strain energy of frame, servomotors, rope, load and drum, (k,)."""
     input: Array
-    """Work of the deck on feet, servomotors and drum, and of the drum's drive, (k,)."""
+    """Work of the deck on feet, servomotors and drum, of the drum's drive, and of servomotors that change their
+    length, (k,)."""
     dissipated: Array
     """By the frame's material, servomotors and rope, (k,)."""
 
@@ -100,6 +101,8 @@ def energy_balance(result: DynamicResult) -> EnergyBalance:
         end = np.array([frame.servomotor_deck_x, sign * frame.half_width, 0.0])
         along = model.to_deck @ servomotor_direction(frame, side)
         power -= servomotors[:, column] * (speed_of(end) @ along)
+    if history.stroke is not None:
+        power -= np.sum(servomotors * history.stroke[1], axis=1)
     drum = case.drum
     pull = result.tension + 0.5 * result.elastic_tension**2 / crane.rope.axial_stiffness
     if isinstance(drum, DrivenDrum):

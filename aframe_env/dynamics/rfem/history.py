@@ -26,6 +26,8 @@ class FrameHistory:
     """Generalised forces on the frame, inertial ones of the deck's motion included, (k, n)."""
     field: Array
     """Uniform acceleration field along {F}: gravity less the deck's acceleration, (k, 3), m/s²."""
+    stroke: Array | None = None
+    """Prescribed change of the lengths of S_R and S_L, its rate and acceleration, (3, k, 2), m, m/s, m/s²."""
 
     def displacement(self, name: str) -> Array:
         """(k, 3), m: displacement of a named point."""
@@ -35,7 +37,7 @@ class FrameHistory:
         """(k, r): reactions in the order of the constraints' names."""
         model = self.model
         residual = self.position @ model.stiffness + self.velocity @ model.damping - self.force
-        return model.reactions(residual)
+        return model.reactions(residual, None if self.stroke is None else self.stroke[2])
 
     def feet(self) -> Array:
         """(k, 2, 3), N: force on the frame at A_R and A_L."""
@@ -61,6 +63,9 @@ class FrameHistory:
         )
 
     def constraint_violation(self) -> float:
-        """Largest movement of a foot from its pin or change of a rigid servomotor's length, m."""
+        """Largest movement of a foot from its pin or error of a rigid servomotor's length, m."""
         rows = [i for i, name in enumerate(self.model.constraints.names) if not name.startswith("J")]
-        return float(np.max(np.abs(self.position @ self.model.constraints.matrix[rows].T)))
+        gap = self.position @ self.model.constraints.matrix[rows].T
+        if self.stroke is not None:
+            gap[:, :2] += self.stroke[0]
+        return float(np.max(np.abs(gap)))

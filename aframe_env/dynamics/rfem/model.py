@@ -81,6 +81,16 @@ class FrameModel:
         return servomotor_rows(self.frame, self.structure)
 
     @cached_property
+    def lengthening(self) -> Array:
+        """(n, 2): share P b of q for S_R or S_L longer by 1 m; zero where they are elastic.
+
+        It moves only the rfes that constraints touch, so never that of S.
+        """
+        if self.frame.structure.servomotor.stiffness is not None:
+            return np.zeros((self.structure.size, 2))
+        return -self.constraints.particular[:, :2]
+
+    @cached_property
     def pulley(self) -> Array:
         """(3, n): displacement of S in {F}; its transpose takes a force at S to generalised forces."""
         return self.structure.translation("S")
@@ -133,11 +143,11 @@ class FrameModel:
     def _bulge(self) -> Array:
         return np.array([spring.bulge for spring in self.structure.springs])
 
-    def reactions(self, residual: Array, extra: Array | None = None) -> Array:
-        """R of K q + L q̇ − f = ``residual``, (…, n) → (…, r); ``extra`` is b̈, (…, r), where lengths
-        change."""
+    def reactions(self, residual: Array, lengthening: Array | None = None) -> Array:
+        """R, (…, r), of ``residual`` K q + L q̇ − f, (…, n), and s̈ of rigid servomotors, (…, 2), m/s²: Pᵀ(K q +
+        L q̇ − f) + (CM⁻¹Cᵀ)⁻¹ b̈."""
         result = residual @ self.constraints.particular
-        return np.asarray(result if extra is None else result + extra @ self.constraints.weight)
+        return np.asarray(result if lengthening is None else result - lengthening @ self.constraints.weight[:2])
 
     def servomotor_tensions(self, position: Array, velocity: Array, reactions: Array) -> Array:
         """Tension of S_R and S_L, (…, 2), N, from the reactions (rigid) or the springs (elastic)."""

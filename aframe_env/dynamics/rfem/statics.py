@@ -196,12 +196,13 @@ def generalised_forces(model: FrameModel, forces: Mapping[str, Array]) -> Array:
     return total
 
 
-def solve(model: FrameModel, right: Array) -> Array:
-    """q, (n,), of the frame at rest under the generalised forces ``right``, (n,), servomotors at their
-    lengths."""
+def solve(model: FrameModel, right: Array, lengthening: Array | None = None) -> Array:
+    """q, (n,), of the frame at rest under the generalised forces ``right``, (n,); ``lengthening`` is the change of
+    the lengths of S_R and S_L, (2,), m, where they are rigid."""
     basis = model.constraints.basis
-    position = basis @ BandedCholesky(model.reduced_stiffness).solve(basis.T @ right)
-    return np.asarray(position, dtype=np.float64)
+    given = np.zeros_like(right) if lengthening is None else model.lengthening @ lengthening
+    free = BandedCholesky(model.reduced_stiffness).solve(basis.T @ (right - model.stiffness @ given))
+    return np.asarray(basis @ free + given, dtype=np.float64)
 
 
 def static(crane: Crane, case: LoadCase, *, model: FrameModel | None = None) -> StaticResult:
