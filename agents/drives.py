@@ -162,6 +162,17 @@ def harmonic_samples(variables: FloatArray, times: FloatArray) -> tuple[FloatArr
     return angle, speed
 
 
+def harmonic_tangents(variables: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Derivatives (T, 3 n) of angle and speed of the ``HarmonicDrive`` by its variables."""
+    a, w, p = variables.reshape(-1, 3).T
+    t = times[:, None]
+    argument = w * t + p
+    sine, cosine = np.sin(argument), np.cos(argument)
+    angle = (sine - np.sin(p), a * t * cosine, a * (cosine - np.cos(p)))
+    speed = (w * cosine, a * (cosine - w * t * sine), -a * w * sine)
+    return tuple(np.stack(parts, axis=2).reshape(len(times), -1) for parts in (angle, speed))  # type: ignore[return-value]
+
+
 @kernel
 def uniform_harmonic_samples(variables: FloatArray, step: float, count: int) -> tuple[FloatArray, FloatArray]:
     """``harmonic_samples`` at 0, step, 2 step, ...: each harmonic a turning complex number, no sine in the loop."""
