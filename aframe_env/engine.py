@@ -21,6 +21,10 @@ MAX_SEGMENT: Final = 0.2
 """Longest stretch of time that one quintic of the pulley's path spans, s."""
 MAX_INNER_STEP: Final = 0.02
 """Longest inner step, s."""
+MAX_KNOT_INTERVAL: Final = 0.4
+"""Longest time between two knots of the motion, s."""
+PATH_ERROR: Final = 4e-6
+"""Most that the quintics between knots may be off the pulley's path, m: a bound, seldom met."""
 INNER_STEP_PHASE: Final = 0.1
 """Most that the load's bobbing on the rope turns in one inner step, rad: RK4's phase error is then below 1e-6
 of the angle turned."""
@@ -49,6 +53,24 @@ def timing(scenario: Scenario, control_period: float, max_inner_step: float | No
     segment = control_period / segments
     longest = max_inner_step or min(MAX_INNER_STEP, INNER_STEP_PHASE / scenario.rope_frequency)
     return Timing(segments, segment, max(1, math.ceil(segment / longest - 1e-9)))
+
+
+def knot_segments(scenario: Scenario, components: Components, segment: float) -> int:
+    """Segments [s] between knots, as many as MAX_KNOT_INTERVAL and PATH_ERROR allow: a power of two.
+
+    A motion that builds up has a knot where its ramp ends, since the quintics must not span the kink.
+    """
+    x, y, z = scenario.crane.pulley_position
+    arms = np.array([1.0, 1.0, 1.0, math.hypot(y, z), math.hypot(x, z), math.hypot(x, y)])
+    amplitudes = np.abs(components.response) @ arms
+    segments = 1
+    while True:
+        interval = 2.0 * segments * segment
+        error = float(amplitudes @ (components.frequency * interval) ** 6) / 46080.0
+        over_ramp = scenario.ramp / interval
+        if interval > MAX_KNOT_INTERVAL + 1e-9 or error > PATH_ERROR or abs(over_ramp - round(over_ramp)) > 1e-9:
+            return segments
+        segments *= 2
 
 
 class Engine:
@@ -96,6 +118,12 @@ class Engine:
     def read_many(self, slot: int, size: int) -> FloatArray:
         """Copy ``size`` successive quantities of all rows: (rows, size)."""
         return self._view[:, slot : slot + size].transpose(0, 2, 1).reshape(-1, size)[: self.rows].copy()
+
+    def deck(self) -> FloatArray:
+        """Surge, sway, heave [m], roll, pitch, yaw [rad] of all rows: (rows, 6)."""
+        coordinates = np.empty((self.rows, 6))
+        self._kernels.deck(self._blocks, coordinates)
+        return coordinates
 
     @property
     def blocks(self) -> FloatArray:
@@ -146,14 +174,17 @@ class Engine:
         if isinstance(motion, ComponentMotion):
             components = motion.components()
             record, record_length = -1, 0
+            segments = self._knot_segments(scenario, components, times)
         else:
             components = Components(np.zeros(0), np.zeros((0, 6), dtype=np.complex128))
             record, record_length = self._record(motion, times.segment)
+            segments = 1
         self._make_room(len(components.frequency))
         row = np.zeros(at.slots(self._components))
         _fill_parameters(row, scenario, times)
         row[at.RECORD], row[at.RECORD_LENGTH] = record, record_length
-        _fill_components(row, components, times.segment)
+        row[at.KNOT_SEGMENTS] = segments
+        _fill_components(row, components, segments * times.segment)
         self._kernels_of_one.start(row[None], self._components, self._records)
         _place_load(row, scenario)
         self._kernels_of_one.start(row[None], self._components, self._records)
@@ -168,6 +199,10 @@ class Engine:
 
     def _timing(self, scenario: Scenario) -> Timing:
         return timing(scenario, self.control_period, self._max_inner_step)
+
+    def _knot_segments(self, scenario: Scenario, components: Components, times: Timing) -> int:
+        """Motion segments between two knots of a scenario's motion: a power of two."""
+        return knot_segments(scenario, components, times.segment)
 
     def _adopt(self, vector: FloatArray, scenario: Scenario) -> FloatArray:
         """Make room for a row of another engine, and point it at this engine's tables: (slots,)."""
@@ -229,16 +264,17 @@ def _fill_parameters(row: FloatArray, scenario: Scenario, times: Timing) -> None
     row[at.RAMP_OFFSET] = 0.0 if scenario.ramp else 1.0
     row[at.CONTROL_PERIOD] = times.segment
     row[at.SUBSTEPS] = times.substeps
+    row[at.INNER_STEP] = times.inner_step
     row[at.HALF_STEP_DECAY] = math.exp(-0.5 * times.inner_step / winch.lag) if winch.lag else 0.0
 
 
-def _fill_components(row: FloatArray, components: Components, segment: float) -> None:
+def _fill_components(row: FloatArray, components: Components, interval: float) -> None:
     slots = row[at.ROW_SLOTS :].reshape(-1, at.COMPONENT_SLOTS)
     count = len(components.frequency)
     slots[:, at.PHASE_RE] = 1.0
     slots[:, at.TURN_RE] = 1.0
-    slots[:count, at.TURN_RE] = np.cos(components.frequency * segment)
-    slots[:count, at.TURN_IM] = np.sin(components.frequency * segment)
+    slots[:count, at.TURN_RE] = np.cos(components.frequency * interval)
+    slots[:count, at.TURN_IM] = np.sin(components.frequency * interval)
     slots[:count, at.FREQUENCY] = components.frequency
     slots[:count, at.RESPONSE : at.RESPONSE + 6] = components.response.real
     slots[:count, at.RESPONSE + 6 : at.RESPONSE + 12] = components.response.imag

@@ -170,4 +170,4 @@ class Simulation:
         return np.stack([mass, self._engine.read(at.FREE_LENGTH)], axis=1)
 
     def _sensed_truth(self) -> FloatArray:
-        return task.sensed_truth(self.state, self._engine.read_many(at.MOTION + 3, 2))
+        return task.sensed_truth(self.state, self._engine.deck()[:, 3:5])

@@ -76,7 +76,7 @@ def scene_of(simulation: Simulation, row: int) -> Scene:
     if scenario is None:
         raise gymnasium.error.ResetNeeded("render() before the first reset()")
     engine, state, results = simulation.engine, simulation.state[row], simulation.results[row]
-    coordinates = engine.read_many(at.MOTION, 6)[row]
+    coordinates = engine.deck()[row]
     return Scene(
         time=float(results[task.TIME]),
         motion=motion_in_words(scenario.motion),
