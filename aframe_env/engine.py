@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
+from aframe_env.dynamics.knots import knot_kernels
 from aframe_env.dynamics.step import step_kernels
-from aframe_env.motion import ComponentMotion, Components, ShipMotion, TabledMotion
+from aframe_env.motion import Components, ShipMotion, TabledMotion, has_components
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_integer, require_number
 
@@ -21,10 +22,6 @@ MAX_SEGMENT: Final = 0.2
 """Longest stretch of time that one quintic of the pulley's path spans, s."""
 MAX_INNER_STEP: Final = 0.02
 """Longest inner step, s."""
-MAX_KNOT_INTERVAL: Final = 0.4
-"""Longest time between two knots of the motion, s."""
-PATH_ERROR: Final = 4e-6
-"""Most that the quintics between knots may be off the pulley's path, m: a bound, seldom met."""
 INNER_STEP_PHASE: Final = 0.1
 """Most that the load's bobbing on the rope turns in one inner step, rad: RK4's phase error is then below 1e-6
 of the angle turned."""
@@ -53,24 +50,6 @@ def timing(scenario: Scenario, control_period: float, max_inner_step: float | No
     segment = control_period / segments
     longest = max_inner_step or min(MAX_INNER_STEP, INNER_STEP_PHASE / scenario.rope_frequency)
     return Timing(segments, segment, max(1, math.ceil(segment / longest - 1e-9)))
-
-
-def knot_segments(scenario: Scenario, components: Components, segment: float) -> int:
-    """Segments [s] between knots, as many as MAX_KNOT_INTERVAL and PATH_ERROR allow: a power of two.
-
-    A motion that builds up has a knot where its ramp ends, since the quintics must not span the kink.
-    """
-    x, y, z = scenario.crane.pulley_position
-    arms = np.array([1.0, 1.0, 1.0, math.hypot(y, z), math.hypot(x, z), math.hypot(x, y)])
-    amplitudes = np.abs(components.response) @ arms
-    segments = 1
-    while True:
-        interval = 2.0 * segments * segment
-        error = float(amplitudes @ (components.frequency * interval) ** 6) / 46080.0
-        over_ramp = scenario.ramp / interval
-        if interval > MAX_KNOT_INTERVAL + 1e-9 or error > PATH_ERROR or abs(over_ramp - round(over_ramp)) > 1e-9:
-            return segments
-        segments *= 2
 
 
 class Engine:
@@ -171,7 +150,7 @@ class Engine:
         """Slots of a row at the start of a scenario: (slots,)."""
         times = self._timing(scenario)
         motion: ShipMotion = scenario.motion
-        if isinstance(motion, ComponentMotion):
+        if has_components(motion):
             components = motion.components()
             record, record_length = -1, 0
             segments = self._knot_segments(scenario, components, times)
@@ -184,7 +163,7 @@ class Engine:
         _fill_parameters(row, scenario, times)
         row[at.RECORD], row[at.RECORD_LENGTH] = record, record_length
         row[at.KNOT_SEGMENTS] = segments
-        _fill_components(row, components, segments * times.segment)
+        knot_kernels().write(row, components.frequency, components.response, segments * times.segment)
         self._kernels_of_one.start(row[None], self._components, self._records)
         _place_load(row, scenario)
         self._kernels_of_one.start(row[None], self._components, self._records)
@@ -202,7 +181,13 @@ class Engine:
 
     def _knot_segments(self, scenario: Scenario, components: Components, times: Timing) -> int:
         """Motion segments between two knots of a scenario's motion: a power of two."""
-        return knot_segments(scenario, components, times.segment)
+        return knot_kernels().segments(
+            components.frequency,
+            components.response,
+            scenario.crane.pulley_position,
+            times.segment,
+            float(scenario.ramp),
+        )
 
     def _adopt(self, vector: FloatArray, scenario: Scenario) -> FloatArray:
         """Make room for a row of another engine, and point it at this engine's tables: (slots,)."""
@@ -214,7 +199,7 @@ class Engine:
             )
         self._make_room((len(vector) - at.ROW_SLOTS) // at.COMPONENT_SLOTS)
         adopted = vector.copy()
-        if not isinstance(scenario.motion, ComponentMotion):
+        if not has_components(scenario.motion):
             adopted[at.RECORD], adopted[at.RECORD_LENGTH] = self._record(scenario.motion, times.segment)
         return adopted
 
@@ -266,18 +251,6 @@ def _fill_parameters(row: FloatArray, scenario: Scenario, times: Timing) -> None
     row[at.SUBSTEPS] = times.substeps
     row[at.INNER_STEP] = times.inner_step
     row[at.HALF_STEP_DECAY] = math.exp(-0.5 * times.inner_step / winch.lag) if winch.lag else 0.0
-
-
-def _fill_components(row: FloatArray, components: Components, interval: float) -> None:
-    slots = row[at.ROW_SLOTS :].reshape(-1, at.COMPONENT_SLOTS)
-    count = len(components.frequency)
-    slots[:, at.PHASE_RE] = 1.0
-    slots[:, at.TURN_RE] = 1.0
-    slots[:count, at.TURN_RE] = np.cos(components.frequency * interval)
-    slots[:count, at.TURN_IM] = np.sin(components.frequency * interval)
-    slots[:count, at.FREQUENCY] = components.frequency
-    slots[:count, at.RESPONSE : at.RESPONSE + 6] = components.response.real
-    slots[:count, at.RESPONSE + 6 : at.RESPONSE + 12] = components.response.imag
 
 
 def _place_load(row: FloatArray, scenario: Scenario) -> None:

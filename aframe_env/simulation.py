@@ -135,8 +135,9 @@ class Simulation:
         values = self.state
         if self._bank is not None:
             values = np.concatenate([self._bank.readings, self._known()], axis=1)
-        clipped = np.clip(values, self._low, self._high)
-        return clipped.astype(np.float32)
+        observation = np.empty(values.shape, dtype=np.float32)
+        task.clip(values, self._low, self._high, observation)
+        return observation
 
     def copy_row(self, index: int) -> RowState:
         """Return the state of a row."""

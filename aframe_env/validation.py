@@ -27,6 +27,8 @@ def require_number(
     low_open: bool = False,
 ) -> None:
     """Raise unless ``value`` is a finite real number in [low, high] (or (low, high])."""
+    if type(value) is float and low < value < high:
+        return
     allowed = f"{_interval(low, high, low_open)} {unit}".rstrip()
     if isinstance(value, bool) or not isinstance(value, Real):
         raise InvalidValue(f"{name} = {value!r}: must be a number in {allowed}")

@@ -8,8 +8,9 @@ import pytest
 
 from aframe_env import Harmonic, HarmonicMotion, Scenario, Sea, SeaMotion
 from aframe_env.dynamics import layout as at
+from aframe_env.dynamics.knots import PATH_ERROR
 from aframe_env.dynamics.motion import on_quintic, quintic, smooth_ramp
-from aframe_env.engine import PATH_ERROR, Engine
+from aframe_env.engine import Engine
 
 
 def test_ramp_is_the_quintic_smoothstep_with_its_derivatives() -> None:
