@@ -37,10 +37,10 @@ def smooth_ramp(time: float, rate: float, offset: float) -> tuple[float, float, 
 
 
 @scalar
-def turn_components(row: Block, components: int, span: Span) -> None:
-    """Advance the phase of each wave component to the next knot, in the lanes that are due for one."""
+def turn_components(row: Block, group: int, span: Span) -> None:
+    """Advance the phases of a group of UNROLL wave components to the next knot, in the lanes that are due."""
     lanes = span.stride
-    for k in range(components):
+    for k in range(group * at.UNROLL, (group + 1) * at.UNROLL):
         base = at.ROW_SLOTS + k * at.COMPONENT_SLOTS
         for j in range(span.begin, span.end):
             due = row[at.DUE * lanes + j] > 0.0
@@ -64,17 +64,18 @@ def add_component(
 
 @scalar
 def sum_components(row: Block, components: int, span: Span) -> None:
-    """Deck coordinates, rates and accelerations at the next knot from the wave components, before the ramp.
+    """Turn the wave components and sum deck coordinates, rates and accelerations at the next knot, before the ramp.
 
-    UNROLL components and three coordinates at a time: the sums stay in registers meanwhile.
+    UNROLL components and three coordinates at a time: the sums stay in registers meanwhile, the components in cache.
     """
     lanes = span.stride
     for i in range(18):
         for j in range(span.begin, span.end):
             row[(at.KNOT + i) * lanes + j] = 0.0
-    for first in (0, 3):
-        for group in range(components // at.UNROLL):
-            begin = at.ROW_SLOTS + group * at.UNROLL * at.COMPONENT_SLOTS
+    for group in range(components // at.UNROLL):
+        turn_components(row, group, span)
+        begin = at.ROW_SLOTS + group * at.UNROLL * at.COMPONENT_SLOTS
+        for first in (0, 3):
             for j in range(span.begin, span.end):
                 p1, v1, a1, p2, v2, a2, p3, v3, a3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
                 for k in range(at.UNROLL):
@@ -247,7 +248,7 @@ def lay_path(row: Block, span: Span) -> None:
 
 @scalar
 def pose_knot(row: Block, components: int, records: npt.NDArray[np.float64], span: Span) -> None:
-    """Deck and pulley at the next knot, from the phases of the components (or the record)."""
+    """Deck and pulley at the next knot, from the components (or the record)."""
     sum_components(row, components, span)
     if records.shape[0] > 0:
         read_record(row, records, span)
@@ -282,7 +283,6 @@ def go_on(row: Block, components: int, records: npt.NDArray[np.float64], span: S
         for j in range(span.begin, span.end):
             before, knot = row[(at.KNOT_BEFORE + i) * lanes + j], row[(at.KNOT + i) * lanes + j]
             row[(at.KNOT_BEFORE + i) * lanes + j] = knot if row[at.DUE * lanes + j] > 0.0 else before
-    turn_components(row, components, span)
     pose_knot(row, components, records, span)
     lay_path(row, span)
 
