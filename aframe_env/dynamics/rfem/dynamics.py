@@ -63,7 +63,8 @@ class DynamicCase:
     """One dynamic run."""
 
     scenario: Scenario = field(default_factory=Scenario.paper)
-    """Crane, ship motion, load and rope; the load starts from static equilibrium. The luffing angle stays as it is."""
+    """Crane, ship motion, load and rope; the load starts from static equilibrium. The luffing angle stays as it is, but
+    for the small rotations that ``strokes`` make."""
     drum: Drum = field(default_factory=StillDrum)
     """What the drum does."""
     strokes: tuple[Stroke, Stroke] | None = None
