@@ -140,6 +140,11 @@ def test_feet_and_cylinders_do_not_drift():
     result = simulate(DynamicCase(scenario=scenario, duration=20.0, step=0.02, output_interval=0.1), model=model(5, 2))
     assert result.frame.constraint_violation() < 1e-12
     assert np.ptp(result.frame.displacement("S")[:, 2]) > 1e-4
+    # What the linear length leaves out is what the displacements say: |u|²/(2 length).
+    beyond = run_checks.second_order_lengths(result)["servomotors C–N"].max()
+    moved = max(np.linalg.norm(result.frame.displacement(f"N_{side}"), axis=1).max() for side in "RL")
+    assert beyond == pytest.approx(moved**2 / (2.0 * 8.266), rel=0.02)
+    assert beyond > 1e-6
 
 
 def test_stress_follows_the_static_one():
