@@ -185,7 +185,6 @@ class _Run:
             before, deflection = deflection, level @ model.pulley @ position
             if np.max(np.abs(deflection - before)) < 1e-13:
                 break
-        model.warn_of_rotation(position)
         stretched = self.unstretched * (1.0 + tension / self.crane.rope.axial_stiffness)
         hanging = stretched - float(np.linalg.norm(drum - undeformed - deflection))
         states = carriage.states

@@ -11,10 +11,11 @@ from aframe_env.dynamics.rfem.model import frame_model
 from aframe_env.dynamics.rfem.reference import time_series
 from aframe_env.dynamics.rfem.release import release
 from aframe_env.dynamics.rfem.rope_law import rope_force
+from aframe_env.dynamics.rfem.statics import LoadCase
 from aframe_env.motion import Harmonic, HarmonicMotion
 from aframe_env.scenario import Scenario
 from aframe_env.section import Material, Servomotor
-from aframe_env.validation import InvalidValue
+from aframe_env.validation import InvalidValue, SmallRotationWarning
 from train.verification import run_checks
 from train.verification.cases import columns_of
 from train.verification.frame_checks import CASES, model, order
@@ -43,6 +44,13 @@ def test_instant_release_is_a_sum_of_modes():
     swings = np.cos(np.outer(history.time, 2 * math.pi * modes.frequency))
     pulley = (swings * amplitude) @ (frame.to_deck @ frame.pulley @ modes.shape).T
     assert np.abs(history.displacement("S") - pulley).max() < 2e-3 * np.abs(pulley).max()
+
+
+def test_release_of_too_great_a_load_warns_once():
+    case = LoadCase(forces={"S": (0.0, 0.0, -3e7)})
+    with pytest.warns(SmallRotationWarning) as caught:
+        release(Crane(), case, duration=0.1, step=1e-3, output_interval=0.01, model=model(5, 2))
+    assert len(caught) == 1
 
 
 def test_damped_release_comes_to_rest_under_its_weight():

@@ -60,10 +60,11 @@ def test_range_of_a_stroke_is_as_stated():
     assert np.linalg.norm(luffing_rotation(angle) @ reach + found) - reach[2] == pytest.approx(15e-3, abs=2e-3)
 
 
-def test_a_stroke_beyond_its_range_warns():
+def test_a_stroke_beyond_its_range_warns_once():
     strokes = (Stroke.smooth(0.2, 0.5), Stroke.smooth(0.2, 0.5))
-    with pytest.warns(SmallRotationWarning, match=r"turned by 0\.0[67]\d* rad"):
+    with pytest.warns(SmallRotationWarning, match=r"turned by 0\.0[67]\d* rad") as caught:
         simulate(DynamicCase(scenario=LIGHT, strokes=strokes, duration=0.6, step=5e-3), model=model(5, 2))
+    assert len(caught) == 1
 
 
 def test_slow_stroke_ends_in_the_static_solution():
