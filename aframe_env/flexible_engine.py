@@ -85,7 +85,7 @@ class FlexibleEngine(Engine):
         self._readout = readout_kernel(self._lanes, rows > at.LANES)
 
     def read_frames(self) -> FloatArray:
-        """Deflection of S, reactions, servomotor tensions and utilisation of all rows: (rows, READOUTS)."""
+        """Deflection of S, reactions, servomotor tensions, utilisation, rotation of all rows: (rows, READOUTS)."""
         result = np.zeros((self.rows, READOUTS))
         self._readout(self._frames, self._readout_tables, result)
         return result

@@ -7,6 +7,10 @@ from numbers import Real
 from typing import Any
 
 
+class SmallRotationWarning(UserWarning):
+    """An rfe of the full model has turned by more than the linear kinematics of eq. (10) can take."""
+
+
 class InvalidValue(ValueError):
     """A value outside what the model can take. The message names it, its range and its unit."""
 
