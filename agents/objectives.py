@@ -69,6 +69,8 @@ def coarse_step(scenario: Scenario) -> float:
 def _advance(x1, x2, x3, v1, v2, v3, a, b, c, angles, speeds, p, h):  # type: ignore[no-untyped-def]
     """Inner step of length h: pulley a, b, c, drum angles and speeds at its start, middle and end."""
     target, to_pulley, stiffness, damping, mass, gravity, free_length, radius = p
+    la, lb, lc = free_length + radius * angles[0], free_length + radius * angles[1], free_length + radius * angles[2]
+    ra, rb, rc = radius * speeds[0], radius * speeds[1], radius * speeds[2]
     return rk4_step(
         x1,
         x2,
@@ -76,13 +78,12 @@ def _advance(x1, x2, x3, v1, v2, v3, a, b, c, angles, speeds, p, h):  # type: ig
         v1,
         v2,
         v3,
-        (a[0], a[1], a[2], a[3], a[4], a[5], free_length + radius * angles[0], radius * speeds[0]),
-        (b[0], b[1], b[2], b[3], b[4], b[5], free_length + radius * angles[1], radius * speeds[1]),
-        (c[0], c[1], c[2], c[3], c[4], c[5], free_length + radius * angles[2], radius * speeds[2]),
+        (a[0], a[1], a[2], a[3], a[4], a[5], la, ra, stiffness / la),
+        (b[0], b[1], b[2], b[3], b[4], b[5], lb, rb, stiffness / lb),
+        (c[0], c[1], c[2], c[3], c[4], c[5], lc, rc, stiffness / lc),
         h,
         target,
         to_pulley,
-        stiffness,
         damping,
         mass,
         gravity,
