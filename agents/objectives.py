@@ -114,7 +114,7 @@ def _kernel() -> Callable[..., tuple[float, float, float]]:
             k = 2 * i
             angles = (angle[k], angle[k + 1], angle[k + 2])
             speeds = (speed[k], speed[k + 1], speed[k + 2])
-            x1, x2, x3, v1, v2, v3, cost, _ = _advance(
+            x1, x2, x3, v1, v2, v3, cost, _ = _advance(  # type: ignore[no-untyped-call]
                 x1, x2, x3, v1, v2, v3, path[k], path[k + 1], path[k + 2], angles, speeds, p, h
             )
             omega1 += cost
@@ -157,7 +157,7 @@ def _lanes_kernel() -> Callable[..., None]:
             for j in range(lanes):
                 angles = (angle_a + more_angle[k, j], angle_b + more_angle[k + 1, j], angle_c + more_angle[k + 2, j])
                 speeds = (speed_a + more_speed[k, j], speed_b + more_speed[k + 1, j], speed_c + more_speed[k + 2, j])
-                x1[j], x2[j], x3[j], v1[j], v2[j], v3[j], _, _ = _advance(
+                x1[j], x2[j], x3[j], v1[j], v2[j], v3[j], _, _ = _advance(  # type: ignore[no-untyped-call]
                     x1[j], x2[j], x3[j], v1[j], v2[j], v3[j], a, b, c, angles, speeds, p, h
                 )
                 errors[i + 1, j] = x3[j] - target

@@ -3,8 +3,8 @@
 The guess is the inverse of the model's vertical motion: the rope that a load held at h would need while the pulley
 moves. Restarts around the best vertex, with a fresh simplex, take Nelder-Mead out of the stalls it is known for.
 
-Beside it, for Ω1 alone: Gauss-Newton on the depth error at the inner steps. The drive enters the error nearly
-linearly, so a few steps do; a Jacobian is the run of one neighbour of the drive for each variable, all side by side.
+Beside it, for Ω1: Gauss-Newton on the depth error at the inner steps. The drive enters the error nearly linearly, so
+a few steps do; a Jacobian is the run of one neighbour of the drive for each variable, all side by side.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ from agents.objectives import FINE_STEP, Objective, Outcome, coarse_step
 FloatArray = npt.NDArray[np.float64]
 Family = Literal["spline", "harmonic"]
 ObjectiveName = Literal["omega1", "omega2"]
-Method = Literal["nelder-mead", "gauss-newton"]
+Optimiser = Literal["nelder-mead", "gauss-newton"]
 FAMILIES: Final[tuple[Family, ...]] = ("spline", "harmonic")
 OBJECTIVES: Final[tuple[ObjectiveName, ...]] = ("omega1", "omega2")
-METHODS: Final[tuple[Method, ...]] = ("nelder-mead", "gauss-newton")
+OPTIMISERS: Final[tuple[Optimiser, ...]] = ("nelder-mead", "gauss-newton")
 Progress = Callable[[int, float], object]
 """Called with the number of evaluations so far and the best value of the objective."""
 
@@ -97,15 +97,16 @@ def optimise(
     max_evaluations: int = 6_000,
     progress: Progress | None = None,
     *,
-    method: Method = "nelder-mead",
+    optimiser: Optimiser = "nelder-mead",
     start: npt.ArrayLike | None = None,
 ) -> OptimisedDrive:
     """Find the drive of a family that makes an objective least on a scenario whose future is known.
 
     ``duration`` is t_k [s]; ``intervals`` (of a spline) is in [3, 500], ``harmonics`` in [1, 64]. The same
-    arguments give the same drive; ``seed`` turns the simplexes of the restarts. ``method`` "gauss-newton" is for Ω1
-    alone. ``start`` gives decision variables to start from, such as those of a like scenario's drive; their number
-    is then ``intervals``, or 3 ``harmonics``. Raises InvalidValue for arguments out of range.
+    arguments give the same drive; ``seed`` turns the simplexes of the restarts. The search for Ω2 starts from the
+    optimum of Ω1, which ``optimiser`` finds; it is itself always Nelder-Mead's, for Ω2 is no sum of squares.
+    ``start`` gives decision variables to start from, such as those of a like scenario's drive; their number is then
+    ``intervals``, or 3 ``harmonics``. Raises InvalidValue for arguments out of range.
     """
     require_choice("family", family, FAMILIES)
     require_choice("objective", objective, OBJECTIVES)
@@ -114,28 +115,22 @@ def optimise(
     require_integer("harmonics", harmonics, low=1, high=64)
     require_integer("seed", seed, low=0, high=2**32 - 1)
     require_integer("max_evaluations", max_evaluations, low=1, high=10**9)
-    require_choice("method", method, METHODS)
-    if method == "gauss-newton" and objective != "omega1":
-        raise InvalidValue(f"objective = {objective!r}: must be 'omega1' with method 'gauss-newton' (least squares)")
+    require_choice("optimiser", optimiser, OPTIMISERS)
     size = intervals if family == "spline" else 3 * harmonics
     given = None if start is None else np.asarray(start, dtype=np.float64)
     if given is not None and (given.shape != (size,) or not np.isfinite(given).all()):
         raise InvalidValue(f"start of shape {given.shape}: must be {size} finite decision variables")
     begin = time.perf_counter()
     coarse = Objective(scenario, duration, coarse_step(scenario))
-    if family == "spline":
-        guess = _spline_guess(coarse, intervals, given)
+    guess = _spline_guess(coarse, intervals, given) if family == "spline" else _harmonic_guess(coarse, harmonics, given)
+    first = max_evaluations if objective == "omega1" else max(1, max_evaluations // 2)
+    search = _Search(coarse, max_evaluations, np.random.default_rng(seed), progress)
+    if optimiser == "gauss-newton":
+        x, search.evaluations = _gauss_newton(coarse, guess, first, progress)
     else:
-        guess = _harmonic_guess(coarse, harmonics, given)
-    if method == "gauss-newton":
-        x, evaluations = _gauss_newton(coarse, guess, max_evaluations, progress)
-    else:
-        search = _Search(coarse, max_evaluations, np.random.default_rng(seed), progress)
-        share = 0.5 if objective == "omega2" else 1.0
-        x = search.run(guess.x, guess, "omega1", int(share * max_evaluations))
-        if objective == "omega2":
-            x = search.run(x, guess, "omega2", max_evaluations)
-        evaluations = search.evaluations
+        x = search.run(guess.x, guess, "omega1", first)
+    if objective == "omega2":
+        x = search.run(x, guess, "omega2", max_evaluations)
     drive: Drive = (SplineDrive if family == "spline" else HarmonicDrive).from_variables(x, float(duration))
     seconds = time.perf_counter() - begin
     outcome = Objective(scenario, duration, min(FINE_STEP, coarse.step)).drive(drive)
@@ -147,7 +142,7 @@ def optimise(
         omega2=outcome.omega2,
         rms=outcome.rms,
         amplitude=outcome.amplitude,
-        evaluations=evaluations,
+        evaluations=search.evaluations,
         seconds=seconds,
     )
 
@@ -202,14 +197,20 @@ def _fitted_harmonics(times: FloatArray, needed: FloatArray, harmonics: int) -> 
     """Harmonics taken one by one from the residual's spectrum, all fitted anew after each."""
     taken = slice(None, None, max(1, len(times) // 600))  # enough for waves; the fit stays quick
     t, y = times[taken], needed[taken]
+
+    def residual(v: FloatArray) -> FloatArray:
+        return harmonic_samples(v, t)[0] - y
+
+    def jacobian(v: FloatArray) -> FloatArray:
+        return harmonic_tangents(v, t)[0]
+
     x = np.empty(0)
     for _ in range(harmonics):
-        residual = y - harmonic_samples(x, t)[0]
-        guess = _strongest(t, residual)
+        guess = _strongest(t, -residual(x))
         x = least_squares(
-            lambda v: harmonic_samples(v, t)[0] - y,
+            residual,
             np.concatenate([x, guess]),
-            jac=lambda v: harmonic_tangents(v, t)[0],
+            jac=jacobian,
             x_scale=np.tile([1.0, 0.1, 1.0], len(x) // 3 + 1),
             max_nfev=60,
         ).x

@@ -108,7 +108,7 @@ def test_a_worker_that_dies_is_replaced_and_its_task_tried_again(tmp_path):
 
 def test_a_task_that_always_kills_its_worker_is_reported_and_the_others_are_done(tmp_path):
     with TaskStore(tmp_path / "cells.sqlite", int, "1") as store:
-        with pytest.raises(TasksFailed, match="1 of 4 tasks failed; the first, task 1: .*2 attempts") as failed:
+        with pytest.raises(TasksFailed, match=r"1 of 4 tasks failed; the first, task 1: .*2 attempts") as failed:
             run_tasks(dies, [0, 1, 2, 3], store=store, workers=2, attempts=2)
         assert isinstance(failed.value.failures[0][1], WorkerDied)
         assert sorted(store.read([store.key(n) for n in range(4)]).values()) == [0, 2, 3]
