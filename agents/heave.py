@@ -18,7 +18,7 @@ from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_integer, require_number
 from agents.policy import FloatArray
 
-SAMPLING: Final = 0.2
+SAMPLING: Final = 0.5
 """Interval of a record's samples, s."""
 _BAND: Final = (2.0, 30.0)  # s: periods in which harmonics of a ship's motion are looked for
 
@@ -102,7 +102,7 @@ class Measurement:
     """A record of the tip's heave before the start, and how a forecast is made of it.
 
     As many harmonics are taken as have best forecast later parts of the same record from earlier ones, and as much of
-    them as that forecast was worth: all of a regular wave, little of a sea in which nothing lasts.
+    them as the worst of those forecasts was worth: all of a regular wave, nothing of a sea in which nothing lasts.
     """
 
     record: float = 240.0
@@ -111,9 +111,9 @@ class Measurement:
     """Length of the part that harmonics are fitted to, s."""
     horizon: float = 60.0
     """How far ahead the forecasts are judged, s."""
-    trials: int = 4
+    trials: int = 3
     """Forecasts within the record that the number of harmonics is chosen by."""
-    most: int = 4
+    most: int = 3
     """Greatest number of harmonics."""
 
     def __post_init__(self) -> None:
@@ -129,16 +129,16 @@ class Measurement:
         heave = tip_heave(scenario, times)
         length, ahead = round(self.window / SAMPLING), round(self.horizon / SAMPLING)
         ends = np.linspace(length, len(times) - 1 - ahead, self.trials).astype(int).tolist()
-        best, factor, count = 0.0, 0.0, 0
+        best, share, count = 0.0, 0.0, 0
         for n in range(1, self.most + 1):
-            cross = square = 0.0
-            for end in ends:
+            cross, square = np.empty(self.trials), np.empty(self.trials)
+            for i, end in enumerate(ends):
                 fitted, judged = slice(end - length, end + 1), slice(end + 1, end + 1 + ahead)
                 expected = fit_harmonics(times[fitted], heave[fitted], n).at(times[judged])
-                cross += float(expected @ (heave[judged] - heave[fitted].mean()))
-                square += float(expected @ expected)
-            # What the best share of the forecast would have removed.
-            gain = max(0.0, cross) ** 2 / square if square > 0.0 else 0.0
+                cross[i] = expected @ (heave[judged] - heave[fitted].mean())
+                square[i] = max(float(expected @ expected), 1e-300)
+            worth = float(np.clip(cross / square, 0.0, 1.0).min())
+            gain = float(np.sum(2.0 * worth * cross - worth**2 * square))
             if gain > 1.001 * best:
-                best, factor, count = gain, min(1.0, cross / square), n
-        return fit_harmonics(times[-length - 1 :], heave[-length - 1 :], count).scaled(factor)
+                best, share, count = gain, worth, n
+        return fit_harmonics(times[-length - 1 :], heave[-length - 1 :], count).scaled(share)
