@@ -42,9 +42,9 @@ def draw(path: Path, drive_map: DriveMap, held_out: Sequence[HeldOut], seas: Seq
     for sea in seas:
         still = sea.entries[0].episodes
         for number, entry in enumerate(sea.entries[1:], start=1):
-            values = 100.0 * reductions(entry, still)
+            # What is left, on a logarithmic axis: from 0 to 90 % is as far as from 90 to 99 %.
             reduction.boxplot(
-                values,
+                np.maximum(1.0 - reductions(entry, still), 1e-4),
                 positions=[place],
                 widths=0.7,
                 whis=(5, 95),
@@ -57,10 +57,12 @@ def draw(path: Path, drive_map: DriveMap, held_out: Sequence[HeldOut], seas: Seq
             place += 1
         place += 1
     reduction.set_xticks(*zip(*labels, strict=True), fontsize=8)
-    reduction.set(
-        ylabel="heave reduction, %", title="Held-out scenarios: quartiles, and 5 to 95 %", ylim=(-60.0, 105.0)
-    )
-    reduction.axhline(0.0, color="#888888", lw=0.8)
+    reduction.set_yscale("log")
+    reduction.set_ylim(5.0, 1e-4)
+    ticks = [1.0, 0.1, 0.01, 0.001]
+    reduction.set_yticks(ticks, [f"{1.0 - tick:.1%}".replace(".0%", "%") for tick in ticks])
+    reduction.set(ylabel="heave reduction", title="Held-out scenarios: quartiles, and 5 to 95 %")
+    reduction.axhline(1.0, color="#888888", lw=0.8)
     for axis in (ratio, lead, error, reduction):
         axis.grid(alpha=0.3)
     write_atomically(path, lambda temporary: figure.savefig(temporary, dpi=120))

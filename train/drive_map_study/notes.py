@@ -16,8 +16,8 @@ TEXT = """\
 # Map of basic drives
 Made by `{command}`.
 
-{nodes:,} nodes ({shape}), each one harmonic optimised for Ω1 by Gauss-Newton: {evaluations:.0f} evaluations a node in
-the mean. {speed}
+{nodes:,} nodes ({shape}: heave amplitudes, periods, load masses, rope lengths), each one harmonic optimised for Ω1 by
+Gauss-Newton: {evaluations:.0f} evaluations a node in the mean. {speed}
 
 ## What it says
 For a tip that only heaves the best drive pays out 1/(1 + m g/(E_R F_R)) of the heave, in phase with it, whatever its
@@ -28,8 +28,8 @@ median and {closed_worst:.1e} at most; it leaves {remaining:.1e} of the motion (
 
 ## Between the nodes
 {count} regular heaves that no node has, optimised afresh: the interpolated ratio is off by {error_median:.1e} of the
-heave in the median, {error_worst:.1e} at most. The map's drive leaves {left_median:.2%} of the motion (RMS; worst
-{left_worst:.2%}), the optimum {best_median:.3%} (worst {best_worst:.3%}).
+heave in the median, {error_worst:.1e} at most. The map's drive leaves {left_median:.1e} of the motion (RMS; worst
+{left_worst:.1e}), the optimum {best_median:.1e} (worst {best_worst:.1e}).
 
 ## In seas
 In the environment, with the winch's limits, over 60 s, {scenarios} held-out scenarios of each kind. "Drive map"
@@ -38,6 +38,11 @@ alone. With "every wave known" it is told every component with its phase, which 
 what the map itself is worth, as far as superposition holds. The last row knows the future too.
 
 {tables}
+Where even a drive that knows the future falls short, the sea asks more of the winch than it has (Hs above 3 m), or
+there is next to nothing to remove (a regular wave shorter than 3 s moves the tip by millimetres). The map is behind a
+fresh optimisation by what is not vertical: the tip's horizontal motion makes the load swing, which lifts it, most so on
+short ropes in long waves, and superposition knows nothing of that.
+
 So the map is right, and what fails in a random sea is the forecast: phases measured at the start are worth about one
 wave there, and a drive that runs by the clock for a minute is soon out of step. Measuring notices this (it takes from
 the harmonics only what they have forecast of the record itself) and leaves the drum nearly still. In real time, with
@@ -70,7 +75,7 @@ def notes(
     return TEXT.format(
         command=command,
         nodes=drive_map.ratio.size,
-        shape=" × ".join(map(str, drive_map.shape)) + " amplitudes, periods, masses, lengths",
+        shape=" × ".join(map(str, drive_map.shape)),
         evaluations=float(np.mean([each.evaluations for each in found])),
         speed=f"This run optimised {fresh:,} of them, {rate:.0f} a second." if fresh else "All came from the store.",
         closed_median=float(np.median(off)),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Final
 
@@ -40,20 +41,21 @@ def compare_in(
     drive_map: DriveMap, folder: Path, scenarios: int, workers: int | None, progress: Progress
 ) -> list[InSea]:
     """Run every policy over ``scenarios`` held-out scenarios of each kind, and write a folder for each."""
+    drawn = {kind: held_out_scenarios(distribution, scenarios) for kind, distribution in KINDS.items()}
+    every = [scenario for each in drawn.values() for scenario in each]
+    best = iter(tune(("S-Ω1",), every, optimiser="gauss-newton", workers=workers, progress=progress)["S-Ω1"])
     bar = progress.add_task("seas", total=4 * len(KINDS))
     found = []
-    for kind, distribution in KINDS.items():
-        drawn = held_out_scenarios(distribution, scenarios)
-        best = tune(("S-Ω1",), drawn, optimiser="gauss-newton", workers=workers, progress=progress)["S-Ω1"]
+    for kind, met in drawn.items():
         policies: list[Policy] = [
             DrumStill(),
             DriveMapPolicy(drive_map, duration=DURATION),
             DriveMapPolicy(drive_map, None, duration=DURATION),
-            DrivePolicy("S-Ω1 for each scenario", best, Knowledge.FUTURE),
+            DrivePolicy("S-Ω1 for each scenario", list(islice(best, scenarios)), Knowledge.FUTURE),
         ]
         entries = []
         for policy in policies:
-            entries.append(Entry(policy.name, policy.knows, run(policy, drawn, episode_duration=DURATION)))
+            entries.append(Entry(policy.name, policy.knows, run(policy, met, episode_duration=DURATION)))
             progress.advance(bar)
         rows = compare(entries, entries[0].episodes)
         write_comparison(folder / kind.replace(" ", "-"), rows, entries)
