@@ -96,7 +96,9 @@ def _policy(task: Task) -> Policy:
         return DriveMapPolicy(drive_map.load(task.options.drive_map), None)
     if task.name in TUNED:
         return DrivePolicy(task.name, task.drives, Knowledge.FUTURE)
-    return learned.load(task.name)
+    agent = learned.load(task.name)
+    agent.name = f"{agent.name}, {agent.knows.value}"
+    return agent
 
 
 def study(task: Task) -> Sensitivity:

@@ -39,9 +39,9 @@ what the map itself is worth, as far as superposition holds. The last row knows 
 
 {tables}
 Where even a drive that knows the future falls short, the sea asks more of the winch than it has (Hs above 3 m), or
-there is next to nothing to remove (a regular wave shorter than 3 s moves the tip by millimetres). The map is behind a
-fresh optimisation by what is not vertical: the tip's horizontal motion makes the load swing, which lifts it, most so on
-short ropes in long waves, and superposition knows nothing of that.
+there is next to nothing to remove (a regular wave shorter than 3 s moves the tip by millimetres). With every wave known
+the map is behind a fresh optimisation by what is not linear in the waves: the tip also sinks with the squares of the
+ship's roll and pitch, and the load's swing lifts it. Where the ship only heaves the difference goes.
 
 So the map is right, and what fails in a random sea is the forecast: phases measured at the start are worth about one
 wave there, and a drive that runs by the clock for a minute is soon out of step. Measuring notices this (it takes from
