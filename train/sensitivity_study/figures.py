@@ -51,7 +51,7 @@ def draw_curves(path: Path, studies: Sequence[Sensitivity]) -> None:
 
 def draw_indices(path: Path, studies: Sequence[Sensitivity]) -> None:
     """First-order (filled) and total (outlined) indices of each factor, policy by policy."""
-    figure = Figure(figsize=(12.0, 4.6), layout="constrained")
+    figure = Figure(figsize=(12.0, 4.8), layout="constrained")
     axis = figure.subplots()
     width = 0.8 / len(studies)
     for number, study in enumerate(studies):
@@ -65,6 +65,6 @@ def draw_indices(path: Path, studies: Sequence[Sensitivity]) -> None:
     axis.set_ylabel("share of the variance")
     axis.set_ylim(bottom=0.0)
     axis.set_title("Sobol indices: first order (filled), total with 95 % interval (outlined)", fontsize=11)
-    axis.legend(fontsize=9, ncols=4)
+    figure.legend(loc="outside lower center", ncols=7, fontsize=9)
     axis.grid(alpha=0.3, axis="y")
     write_atomically(path, lambda temporary: figure.savefig(temporary, dpi=120))
