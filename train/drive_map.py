@@ -13,7 +13,7 @@ import itertools
 import shlex
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
@@ -128,7 +128,7 @@ def run(options: Options, console: Console) -> int:
     write_atomically(folder / ARRAYS, lambda temporary: temporary.write_bytes(arrays))
     write_text(folder / CARD, card)
     write_json(folder / "held_out.json", [each.plain for each in held_out])
-    write_text(folder / "config.toml", to_toml(replace(options, store=Path(options.store.name), out=None)))
+    write_text(folder / "config.toml", to_toml(options))
     draw(folder / "drive_map.png", drive_map, held_out, seas)
     text = notes(command, drive_map, found, held_out, seas, fresh, rate)
     write_text(folder / "notes.md", text)
