@@ -104,7 +104,9 @@ def sobol_indices(
     output = np.asarray(evaluate(values), dtype=np.float64)
     if np.ptp(output) <= 1e-9 * abs(output.mean()):
         return tuple(Index(factor.name, 0.0, 0.0, 0.0, 0.0) for factor in factors), output
-    found = analysis.analyze(problem, output, calc_second_order=False, num_resamples=400, seed=seed)
+    # A generator, since SALib takes the seed 0 for none.
+    rng = np.random.default_rng(seed)
+    found = analysis.analyze(problem, output, calc_second_order=False, num_resamples=400, seed=rng)
     columns = [np.asarray(found[key], dtype=np.float64).tolist() for key in ("S1", "S1_conf", "ST", "ST_conf")]
     return tuple(Index(factor.name, *row) for factor, *row in zip(factors, *columns, strict=True)), output
 
