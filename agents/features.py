@@ -58,7 +58,7 @@ def features(observation: npt.NDArray[np.float32], quantities: tuple[Quantity, .
     mass, length = column["load_mass"], column["rope_length"]
     excess = column["rope_tension"] / (mass * GRAVITY) - 1.0
     derived = {
-        # Beyond some metres the agent need only know the side: what it then does it has learned from states it has seen.
+        # Beyond some metres only the side: there the agent does what it has learned nearer.
         "depth_error": 4.0 * np.tanh(0.5 * column["depth_error"]),
         "load_velocity_z": 2.0 * column["load_velocity_z"] if "load_velocity_z" in column else None,
         "load_acceleration_z": 4.0 * excess,
