@@ -123,12 +123,13 @@ rope length, and measure the rest. Figures are RMS depth errors over that of the
 scenario, so that what the scenario itself does is in them too: see the drum still.
 
 ## As assumed, at both ends of each range, and over all ranges at once
-Median over the assumed scenarios; the last columns are mean and standard deviation of the mean over the scenarios
-when all factors vary together over their ranges.
+Median over the assumed scenarios; the last columns are median, 95 % quantile and worst case when all factors vary
+together over their ranges.
 
 {ends}
 ## Sobol indices: first order / total
-Shares of that variance; a factor whose total is well above its first order acts through others.
+Shares of the variance of the decimal logarithm (mean over the assumed scenarios) when all factors vary together. A
+factor whose total is well above its first order acts through others.
 
 {indices}
 """
@@ -142,12 +143,14 @@ def _table(rows: Sequence[Sequence[str]]) -> str:
 def notes(command: str, options: Options, studies: Sequence[Sensitivity]) -> str:
     """Text of notes.md."""
     ranges = [f"{factor.name} {factor.low:.3g} … {factor.high:.3g}" for factor in FACTORS]
-    ends = [["policy", "as assumed", *ranges, "mean, all", "deviation, all"]]
+    ends = [["policy", "as assumed", *ranges, "all: median", "95 %", "worst"]]
     indices = [["policy", *(factor.name for factor in FACTORS)]]
     for each in studies:
         middle = np.median([_at(c.values, c.left, f.assumed) for c, f in zip(each.curves, FACTORS, strict=True)])
         cells = [" … ".join(f"{np.median(c.left[end]):.3g}" for end in (0, -1)) for c in each.curves]
-        ends.append([each.policy, f"{middle:.3g}", *cells, f"{each.mean:.3g}", f"{each.deviation:.3g}"])
+        ends.append(
+            [each.policy, f"{middle:.3g}", *cells, f"{each.median:.3g}", f"{each.high:.3g}", f"{each.worst:.3g}"]
+        )
         shares = [f"{max(0.0, index.first):.2f} / {index.total:.2f}" for index in each.indices]
         indices.append([each.policy, *shares])
     return TEXT.format(command=command, scenarios=options.scenarios, ends=_table(ends), indices=_table(indices))

@@ -159,6 +159,7 @@ def test_the_command_writes_curves_and_indices(tmp_path, monkeypatch):
     phase = np.ravel(drive["curves"][-1]["left"])
     assert phase[[0, 2]] == pytest.approx(2.0 * math.sin(math.pi / 12.0), rel=0.15)
     assert np.ravel(still["curves"][-1]["left"])[1] == pytest.approx(1.0)
+    assert 0.0 < drive["median"] <= drive["high"] <= drive["worst"]
     for name in ("one_at_a_time.png", "sobol.png"):
         assert (out / name).read_bytes().startswith(b"\x89PNG")
 

@@ -62,7 +62,7 @@ def draw_indices(path: Path, studies: Sequence[Sensitivity]) -> None:
         axis.bar(place, total, width, fill=False, edgecolor=_colour(number), yerr=interval, ecolor="#777777")
         axis.bar(place, first, 0.7 * width, color=_colour(number), alpha=0.8, label=study.policy)
     axis.set_xticks(np.arange(len(FACTORS)), [factor.label.split(",")[0] for factor in FACTORS])
-    axis.set_ylabel("share of the variance")
+    axis.set_ylabel("share of the variance of log RMS")
     axis.set_ylim(bottom=0.0)
     axis.set_title("Sobol indices: first order (filled), total with 95 % interval (outlined)", fontsize=11)
     figure.legend(loc="outside lower center", ncols=7, fontsize=9)
