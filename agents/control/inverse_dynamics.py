@@ -11,9 +11,11 @@ from aframe_env.dynamics import layout as at
 from aframe_env.engine import Engine
 from aframe_env.scenario import Scenario
 from aframe_env.task import STATE
-from agents.control.feedback import STATE_GAINS
 from agents.control.regulator import Gains, Lifts, Observation, Regulator
 from agents.policy import FloatArray, Knowledge
+
+GAINS = Gains(effort=1e-4, share=0.05)
+"""Tuned with ``python -m train.tune_control``."""
 
 
 class RequiredRope:
@@ -68,7 +70,7 @@ class InverseDynamics:
     What it leaves is what the winch's limits leave; the regulator calms what they have stirred.
     """
 
-    gains: Gains = STATE_GAINS
+    gains: Gains = GAINS
     name: str = "inverse dynamics"
     knows: Knowledge = field(init=False, default=Knowledge.FUTURE)
     _lifts: Lifts | None = field(init=False, repr=False, default=None)

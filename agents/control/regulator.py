@@ -105,8 +105,8 @@ class Lifts:
 
     def stretch(self, o: Columns) -> FloatArray:
         """Stretch (N,) m of the rope beyond that under the load's weight, as the tension tells."""
-        return np.asarray((o["rope_tension"] - self._weight) * o["rope_length"] / self._axial_stiffness
+        return np.asarray((o["rope_tension"] - self._weight) * o["rope_length"] / self._axial_stiffness)
 
     def load_acceleration(self, o: Columns) -> FloatArray:
         """Vertical acceleration (N,) m/s² of the load, as the tension tells."""
-        return np.asarray((o["rope_tension"] / self._weight - 1.0) * GRAVITY
+        return np.asarray((o["rope_tension"] / self._weight - 1.0) * GRAVITY)
