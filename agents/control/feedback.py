@@ -20,9 +20,9 @@ from agents.control.observer import Observer, PolynomialPredictor
 from agents.control.regulator import Gains, Lifts, Observation, Regulator
 from agents.policy import FloatArray, Knowledge
 
-STATE_GAINS = Gains(effort=1e-3, share=0.05)
+STATE_GAINS = Gains(effort=3e-4, share=0.17)
 """Tuned with ``python -m train.tune_control``."""
-SENSOR_GAINS = Gains(effort=0.03, share=0.1)
+SENSOR_GAINS = Gains(effort=0.012, share=0.13)
 """Tuned with ``python -m train.tune_control``."""
 
 

@@ -14,7 +14,7 @@ from aframe_env.task import STATE
 from agents.control.regulator import Gains, Lifts, Observation, Regulator
 from agents.policy import FloatArray, Knowledge
 
-GAINS = Gains(effort=1e-4, share=0.05)
+GAINS = Gains(effort=4e-5, share=0.1)
 """Tuned with ``python -m train.tune_control``."""
 
 
