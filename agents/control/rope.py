@@ -39,6 +39,10 @@ class RopeModel:
         # A change of p at the start of the step is as good as a p that was there before it.
         return cls(a, a[:, :, 3].copy())
 
+    def row(self, index: int) -> RopeModel:
+        """Model of one row."""
+        return RopeModel(self.a[index : index + 1], self.b[index : index + 1])
+
     def advance(self, z: FloatArray, change: FloatArray) -> FloatArray:
         """State (N, 4) a control step after ``z`` (N, 4), p having changed by ``change`` (N,) m/s."""
         return np.asarray((self.a @ z[:, :, None])[:, :, 0] + self.b * change[:, None])
