@@ -25,7 +25,9 @@ class Bank:
     """rad/s."""
     highest: float = 2.1
     """rad/s."""
-    bands: int = 16
+    bands: int = 24
+    damping: float = 0.02
+    """Rate at which an oscillator forgets, 1/s; half a band's width fills the gaps between them."""
     variance: float = 0.25
     """Of the heave rate, spread evenly over the bands, m²/s²."""
     noise: float = 0.015
@@ -38,11 +40,10 @@ class BankPredictor:
     def __init__(self, rows: int, control_period: float, bank: Bank | None = None) -> None:
         bank = bank or Bank()
         frequency = np.linspace(bank.lowest, bank.highest, bank.bands)
-        # An oscillator of this damping fills the band between its neighbours.
-        damping = 0.5 * (bank.highest - bank.lowest) / bank.bands
+        damping = bank.damping
         self._exponent = -damping + 1j * frequency
         self._turn = np.exp(self._exponent * control_period)
-        a = block_diag(*[[[t.real, -t.imag], [t.imag, t.real]] for t in self._turn])
+        a = block_diag(*(np.array([[t.real, -t.imag], [t.imag, t.real]]) for t in self._turn))
         stir = bank.variance / bank.bands * (1.0 - np.exp(-2.0 * damping * control_period))
         c = np.tile([1.0, 0.0], bank.bands)[:, None]
         p = solve_discrete_are(a.T, c, stir * np.eye(len(a)), np.array([[bank.noise**2]]))
