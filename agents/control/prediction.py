@@ -23,11 +23,11 @@ class Bank:
 
     lowest: float = 0.3
     """rad/s."""
-    highest: float = 2.1
+    highest: float = 1.6
     """rad/s."""
-    bands: int = 24
-    damping: float = 0.02
-    """Rate at which an oscillator forgets, 1/s; half a band's width fills the gaps between them."""
+    bands: int = 40
+    damping: float = 0.002
+    """Rate at which an oscillator forgets, 1/s; its inverse bounds how far the filter looks back."""
     variance: float = 0.25
     """Of the heave rate, spread evenly over the bands, m²/s²."""
     noise: float = 0.015
