@@ -20,9 +20,9 @@ from agents.control.observer import Observer, PolynomialPredictor
 from agents.control.regulator import Gains, Lifts, Observation, Regulator
 from agents.policy import FloatArray, Knowledge
 
-STATE_GAINS = Gains(effort=3e-4, share=0.17)
+STATE_GAINS = Gains(effort=0.087, share=0.018)
 """Tuned with ``python -m train.tune_control``."""
-SENSOR_GAINS = Gains(effort=0.012, share=0.13)
+SENSOR_GAINS = Gains(effort=0.026, share=0.049)
 """Tuned with ``python -m train.tune_control``."""
 
 

@@ -14,7 +14,7 @@ from aframe_env.task import STATE
 from agents.control.regulator import Gains, Lifts, Observation, Regulator
 from agents.policy import FloatArray, Knowledge
 
-GAINS = Gains(effort=4e-5, share=0.1)
+GAINS = Gains(effort=0.069, share=0.016)
 """Tuned with ``python -m train.tune_control``."""
 
 

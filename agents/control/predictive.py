@@ -79,7 +79,7 @@ class Problem:
 class PredictiveControl:
     """Model-predictive control on the sensors, with the pulley's motion foretold by a bank of oscillators."""
 
-    effort: float = 0.012
+    effort: float = 0.026
     """Price of changing the rope end's speed, s²; that of the feedback law beside it."""
     horizon: int = 25
     """Control steps."""

@@ -101,22 +101,22 @@ def test_feed_forward_cancels_a_sinusoidal_heave():
     expected = w * np.cos(w * times) / scenario.crane.winch.drum_radius
     # The commanded speed is held for a control step: it is that of a middle of it.
     assert abs(episodes.drum_speed[0] - expected)[full].max() < 0.6 * w**2 * PERIOD / 0.75
-    assert abs(episodes.error[0]).max() < 2e-3
+    assert abs(episodes.error[0]).max() < 5e-3
     assert abs(run(DrumStill(), [scenario], episode_duration=60.0).error[0]).max() > 0.9
 
 
 @pytest.mark.parametrize(("policy", "observation"), [(StateFeedback, "state"), (InverseDynamics, "state")])
-def test_a_load_that_was_lifted_away_is_brought_back(policy, observation):
-    """Without a sea the regulator alone has to calm a load that starts away from rest."""
-    still_ship = dataclasses.replace(
+def test_what_a_sudden_start_stirs_is_calmed(policy, observation):
+    """The ship moves at once, the load is at rest: the regulator has to calm what that stirs, and not keep it up."""
+    scenario = dataclasses.replace(
         sinusoid(),
         motion=HarmonicMotion(harmonics=(Harmonic(coordinate="heave", amplitude=0.5, period=9.0),)),
         ramp=0.0,
     )
-    still_ship = dataclasses.replace(still_ship, initial="rest")
-    episodes = run(policy(), [still_ship], observation=observation, episode_duration=60.0)
+    scenario = dataclasses.replace(scenario, initial="rest")
+    episodes = run(policy(), [scenario], observation=observation, episode_duration=60.0)
     assert abs(episodes.error[0, :100]).max() > 1e-2
-    assert abs(episodes.error[0, 300:]).max() < 1e-3
+    assert abs(episodes.error[0, 300:]).max() < 3e-3
 
 
 def test_required_rope_holds_the_load_without_feedback():
