@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -47,10 +46,6 @@ class PolynomialPredictor:
         """Velocity (T, N) m/s."""
         t, now = times[:, None], self._estimate
         return now.pulley_velocity + t * (now.pulley_acceleration + t * now.pulley_jerk / 2.0)
-
-
-MakePredictor = Callable[[int, float], Predictor]
-"""Called with the number of rows and the control period, s."""
 
 
 class Observer:
