@@ -17,19 +17,19 @@ def command(monkeypatch, *arguments):
 def test_the_committed_agent_is_as_good_as_the_results_say(model, tmp_path, monkeypatch):
     out = tmp_path / "out"
     few = ("--scenarios", 12, "--privileged", 0)
-    assert command(monkeypatch, "--agent", AGENT, "--model", model, *few, "--out", out) == 0
+    assert command(monkeypatch, "--policies", AGENT, "--model", model, *few, "--no-report", "--out", out) == 0
     rows = {row["policy"]: row for row in json.loads((out / "comparison.json").read_text(encoding="utf-8"))}
     assert rows["PPO"]["reduction"]["median"] > 0.95
     assert rows["PPO"]["worse_than_still"] == 0
-    assert json.loads((out / "run.json").read_text())["command"].startswith("python -m train.evaluate --agent")
+    assert json.loads((out / "run.json").read_text())["command"].startswith("python -m train.evaluate --policies")
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--agent", "absent"), "no agent in 'absent'"),
-        (("--agent", AGENT, "--scenarios", 0), "scenarios = 0: must be in [1, 1000000]"),
-        (("--agent", AGENT, "--rfem-modes", 5), "rfem_modes"),
+        (("--policies", "absent"), "policy = 'absent': must be one of 'drum still'"),
+        (("--scenarios", 0), "scenarios = 0: must be in [1, 20000]"),
+        (("--rfem-modes", 5), "rfem_modes"),
     ],
 )
 def test_bad_options_are_one_clear_line(arguments, words, tmp_path, monkeypatch, capsys):
