@@ -105,7 +105,7 @@ class FeatureMaker:
         excess = column["rope_tension"] / (mass * GRAVITY) - 1.0
         estimate = estimator.estimate(rows)
         derived = (
-            2.0 * estimate.depth_error,
+            _side(estimate.depth_error),
             2.0 * estimate.load_velocity,
             4.0 * excess,
             estimate.pulley_velocity,
@@ -127,7 +127,7 @@ def state_features(o: npt.NDArray[np.float64], columns: dict[str, int]) -> Float
     mass, length = column["load_mass"], column["rope_length"]
     excess = column["rope_tension"] / (mass * GRAVITY) - 1.0
     derived = (
-        2.0 * column["depth_error"],
+        _side(column["depth_error"]),
         2.0 * column["load_velocity_z"],
         4.0 * excess,
         column["pulley_velocity_z"],
@@ -138,6 +138,11 @@ def state_features(o: npt.NDArray[np.float64], columns: dict[str, int]) -> Float
         *_lift(mass, length),
     )
     return _stacked(derived)
+
+
+def _side(depth_error: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Depth error; beyond some metres only its side, so that there the agent does what it has learned nearer."""
+    return 4.0 * np.tanh(0.5 * depth_error)
 
 
 def _lift(mass: npt.NDArray[np.float64], length: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], ...]:
