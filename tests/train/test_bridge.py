@@ -9,8 +9,8 @@ from aframe_env import ScenarioDistribution
 from aframe_env.env import AFrameHeaveEnv
 from aframe_env.task import STATE
 from agents.features import STATE_FEATURES, FeatureMaker
-from train.bridge import TrainingVecEnv
 from train import ppo, sac
+from train.bridge import TrainingVecEnv
 
 
 def bridge(rows=3, **changes):
