@@ -20,7 +20,7 @@ from aframe_env.sensors import Sensors
 from aframe_env.structuring import strict_converter, structure
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue
-from agents.features import feature_names, features
+from agents.features import FeatureMaker, feature_names
 from agents.network import Actor
 from agents.policy import FloatArray, Knowledge
 
@@ -49,6 +49,8 @@ class AgentCard:
     versions: dict[str, str]
     sha256: str
     """Of the file of weights."""
+    squashed: bool = False
+    """Whether the action passes through tanh instead of being clipped."""
     format: int = FORMAT
 
 
@@ -65,6 +67,7 @@ class LearnedPolicy:
         self.name = self.card.algorithm
         self.knows = Knowledge.STATE if self.card.observation == "state" else Knowledge.SENSORS
         self._quantities = STATE if self.card.observation == "state" else SENSED
+        self._features: FeatureMaker | None = None
         expected = feature_names(self._quantities)
         if self.card.features != expected:
             raise InvalidValue(f"the agent's features are {self.card.features}, this version makes {expected}")
@@ -75,15 +78,24 @@ class LearnedPolicy:
             raise InvalidValue(
                 f"control_period = {control_period} s: the agent was trained for {self.card.control_period} s"
             )
+        self._features = None
 
     def act(self, observation: npt.NDArray[np.float32], time: float) -> FloatArray:
-        """Drum speed commands (N,) rad/s."""
+        """Drum speed commands (N,) rad/s; the first call since the last reset begins the agent's memory."""
+        rows = len(observation)
+        if self._features is None:
+            self._features = FeatureMaker(self._quantities, rows, self.card.control_period)
+            features = self._features.start(observation, np.arange(rows))
+        else:
+            features = self._features.advance(observation)
         with torch.no_grad():
-            share = self.actor(torch.from_numpy(features(observation, self._quantities)))
+            share = self.actor(torch.from_numpy(features))
         return np.asarray(self.card.speed_limit * share[:, 0].double().numpy())
 
-    def predict(self, observation: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
-        """Action (1,) rad/s for one observation (K,) of the environment."""
+    def predict(self, observation: npt.NDArray[np.float32], *, first: bool = False) -> npt.NDArray[np.float32]:
+        """Action (1,) rad/s for one observation (K,) of the environment; ``first``: an episode's first one."""
+        if first:
+            self._features = None
         return self.act(observation[None], 0.0).astype(np.float32)
 
 
@@ -119,7 +131,7 @@ def load(folder: str | Path) -> LearnedPolicy:
         raise InvalidValue(f"{path / CARD}: format = {card.format!r}: this version reads format {FORMAT}")
     if digest(weights) != card.sha256:
         raise InvalidValue(f"{path / WEIGHTS}: does not match the sha256 in {CARD}: damaged or not its file")
-    actor = Actor(len(card.features), card.hidden)
+    actor = Actor(len(card.features), card.hidden, squashed=card.squashed)
     try:
         actor.load_state_dict(load_tensors(weights))
     except (RuntimeError, SafetensorError) as error:

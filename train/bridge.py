@@ -20,9 +20,11 @@ from stable_baselines3.common.vec_env import VecEnv
 from aframe_env import task
 from aframe_env.scenario import ScenarioSource
 from aframe_env.simulation import Simulation
-from agents.features import feature_names, features
+from agents.features import STATE_FEATURES, FeatureMaker, state_features
 
 Float32Array = npt.NDArray[np.float32]
+
+_COLUMNS = {quantity.name: i for i, quantity in enumerate(task.STATE)}
 
 
 class TrainingVecEnv(VecEnv):
@@ -57,10 +59,15 @@ class TrainingVecEnv(VecEnv):
         self._commands = np.zeros(rows)
         self._actions = np.zeros((rows, 1), dtype=np.float32)
         self._no_infos: list[dict[str, Any]] = [{} for _ in range(rows)]
-        names = feature_names(self._simulation.quantities)
+        self._features = FeatureMaker(self._simulation.quantities, rows, control_period)
+        self.actor_inputs = len(self._features.names)
+        """Of the observation's features, so many are the agent's; the rest is for the critics."""
+        self._privileged = self._simulation.quantities != task.STATE
+        inputs = self.actor_inputs + (len(STATE_FEATURES) if self._privileged else 0)
+        self._observations = np.zeros((rows, inputs), dtype=np.float32)
         super().__init__(
             rows,
-            spaces.Box(-20.0, 20.0, (len(names),), np.float32),
+            spaces.Box(-20.0, 20.0, (inputs,), np.float32),
             spaces.Box(-1.0, 1.0, (1,), np.float32),
         )
         self._left = np.zeros(rows, dtype=np.int64)
@@ -92,7 +99,7 @@ class TrainingVecEnv(VecEnv):
         """Start all rows at random times of their horizon, so that they do not all end at once."""
         self._restart(np.arange(self.num_envs))
         self._left = self._rng.integers(1, self._horizon + 1, self.num_envs)
-        return self._features()
+        return self._observations.copy()
 
     def step_async(self, actions: Float32Array) -> None:
         """Take the actions (rows, 1), shares of the speed limit."""
@@ -105,36 +112,42 @@ class TrainingVecEnv(VecEnv):
         cost = simulation.results[:, task.COST]
         self._error_sum += float(cost.sum())
         self._still_sum += float(np.square(simulation.state[:, 6]).sum()) * simulation.control_period
-        rewards = -self._reward_scale * np.sqrt(np.minimum(cost / simulation.control_period, 1e4))
+        rms = np.sqrt(np.minimum(cost / simulation.control_period, 1e4))
+        rewards = -self._reward_scale * rms
         self._return += rewards
         self._length += 1
         self._left -= 1
         parted = simulation.results[:, task.PARTED] > 0.0
         drifted = np.abs(simulation.state[:, 0]) > self._drift_limit
         finished = parted | drifted | (self._left <= 0) | (simulation.steps >= simulation.episode_steps)
-        observations = self._features()
+        self._look()
         infos = self._no_infos
         if finished.any():
             infos = list(infos)
             rows = np.flatnonzero(finished)
             for i in rows.tolist():
                 infos[i] = {
-                    "terminal_observation": observations[i],
+                    "terminal_observation": self._observations[i].copy(),
                     "TimeLimit.truncated": not parted[i],
                     "episode": {"r": float(self._return[i]), "l": int(self._length[i]), "t": 0.0},
                 }
             self._restart(rows)
-            observations = self._features()
-        return observations, rewards.astype(np.float32), finished, infos
+        return self._observations.copy(), rewards.astype(np.float32), finished, infos
 
     def _restart(self, rows: npt.NDArray[np.int64]) -> None:
         self._simulation.reset_rows(rows, [self._simulation.draw(self._rng) for _ in rows])
         self._left[rows] = self._horizon
         self._return[rows] = 0.0
         self._length[rows] = 0
+        first = self._features.start(self._simulation.observe()[rows], rows)
+        self._observations[rows, : self.actor_inputs] = first
+        if self._privileged:
+            self._observations[rows, self.actor_inputs :] = state_features(self._simulation.state[rows], _COLUMNS)
 
-    def _features(self) -> Float32Array:
-        return features(self._simulation.observe(), self._simulation.quantities)
+    def _look(self) -> None:
+        self._observations[:, : self.actor_inputs] = self._features.advance(self._simulation.observe())
+        if self._privileged:
+            self._observations[:, self.actor_inputs :] = state_features(self._simulation.state, _COLUMNS)
 
     def close(self) -> None:
         """Nothing to close."""
