@@ -1,6 +1,6 @@
 """The bridge from the native vector environment to Stable-Baselines3, with what training needs on top.
 
-Actions are shares of what the winch can change within a control step; observations are features; the reward is the
+Actions are outputs of the agent's network and observations its inputs (see ``agents.features``); the reward is the
 depth error's root mean square over the step in place of its square, so that its gradient does not vanish near zero and
 a small sea weighs as much as a large one; an episode is cut, with the value of its last state, where the load has
 drifted far off.
@@ -95,7 +95,7 @@ class TrainingVecEnv(VecEnv):
         return self._observations.copy()
 
     def step_async(self, actions: Float32Array) -> None:
-        """Take the actions (rows, 1), shares of what the winch can change."""
+        """Take the actions (rows, 1), outputs of the agent's network."""
         self._commands = self._features.command(actions[:, 0].astype(np.float64))
 
     def step_wait(self):  # type: ignore[no-untyped-def]
