@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.signal import periodogram
+from scipy.signal import detrend, periodogram
 
 from agents.policy import FloatArray
 from agents.rollout import Episodes
@@ -21,6 +21,8 @@ NEAR: Final = 0.15
 """Relative distance within which two periods are taken as the same."""
 START: Final = 10.0
 """s that count as the start."""
+FEWEST_SAMPLES: Final = 200
+"""Of an error that has something to say of itself: after a rope that parts early there are not so many."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,12 @@ class Field:
         return cls(comparison.still.rms, tuple(Traits.of(s) for s in comparison.scenarios))
 
 
+def intact(episodes: Episodes, index: int) -> int:
+    """How many of an episode's control steps there are to look at: all, or those until the rope parts."""
+    tension = episodes.tension[index]
+    return 1 + int(np.flatnonzero(tension)[-1]) if episodes.parted[index] and tension.any() else len(tension)
+
+
 def remarks(comparison: Comparison, field: Field, episodes: Episodes, index: int) -> list[str]:
     """What is worth saying of one episode, the gravest first; never empty."""
     found = [
@@ -51,7 +59,8 @@ def remarks(comparison: Comparison, field: Field, episodes: Episodes, index: int
 def _rope(episodes: Episodes, index: int) -> list[str]:
     found = []
     if episodes.parted[index]:
-        found.append("The rope parted and the load was lost.")
+        time = CONTROL_PERIOD * intact(episodes, index)
+        found.append(f"The rope parted at {time:.1f} s and the load was lost; Ω1 and Ω2 have its free fall in them.")
     events = int(episodes.slack_events[index])
     if events:
         found.append(f"The rope went slack {events} time{'s' if events > 1 else ''}.")
@@ -60,7 +69,7 @@ def _rope(episodes: Episodes, index: int) -> list[str]:
 
 def _winch(comparison: Comparison, episodes: Episodes, index: int) -> list[str]:
     winch = comparison.scenarios[index].crane.winch
-    speed = episodes.drum_speed[index].astype(np.float64)
+    speed = episodes.drum_speed[index, : intact(episodes, index)].astype(np.float64)
     at_speed = float(np.mean(abs(speed) > 0.999 * winch.max_speed))
     at_acceleration = float(np.mean(abs(np.diff(speed)) > 0.999 * winch.max_acceleration * CONTROL_PERIOD))
     found = []
@@ -89,10 +98,10 @@ def _scenario(field: Field, index: int) -> list[str]:
 
 
 def _residual(episodes: Episodes, traits: Traits, index: int) -> list[str]:
-    error = episodes.error[index].astype(np.float64)
+    error: FloatArray = episodes.error[index, : intact(episodes, index)].astype(np.float64)
     square = error**2
     total = float(square.sum())
-    if total == 0.0:
+    if total == 0.0 or len(error) < FEWEST_SAMPLES:
         return []
     found = []
     mean = float(error.mean())
@@ -101,7 +110,7 @@ def _residual(episodes: Episodes, traits: Traits, index: int) -> list[str]:
     early = float(square[: round(START / CONTROL_PERIOD)].sum()) / total
     if early > 0.5:
         found.append(f"{early:.0%} of Ω1 comes from the first {START:g} s: the start.")
-    frequency, density = periodogram(error, fs=1.0 / CONTROL_PERIOD, window="hann", detrend="linear")
+    frequency, density = periodogram(detrend(error), fs=1.0 / CONTROL_PERIOD, window="hann")
     peak = 1.0 / float(frequency[1 + np.argmax(density[1:])])
     if abs(peak - traits.rope_period) < NEAR * traits.rope_period:
         found.append(
