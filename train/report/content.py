@@ -26,16 +26,18 @@ BINS: Final = 8
 QUANTILES: Final = {
     0.5: "median",
     0.0: "best",
-    0.1: "10 % quantile",
-    0.25: "25 % quantile",
-    0.75: "75 % quantile",
-    0.9: "90 % quantile",
+    0.1: "10\u00a0% quantile",
+    0.25: "25\u00a0% quantile",
+    0.75: "75\u00a0% quantile",
+    0.9: "90\u00a0% quantile",
     1.0: "worst in which every policy ran",
 }
 """Of what the reference leaves: the scenarios to look at."""
 WORST: Final = ("worst of all", "second worst", "third worst", "fourth worst")
 WORST_SHARE: Final = 0.01
 FEWEST_WORST, MOST_WORST = 2, 10
+REMOVES_NOTHING: Final = 0.95
+"""What is left by a policy that does next to nothing."""
 SPECTRUM_SAMPLES: Final = 512
 """Samples in a segment of a spectrum: 51.2 s, so a resolution of 0.02 Hz."""
 TRAITS: Final = {
@@ -165,7 +167,7 @@ class Content:
     reference: int
     """The policy that the page looks at first: the best of those that do not know the future."""
     featured: list[int]
-    """Drawn first where all would be too many: the best policy of each kind of knowledge."""
+    """Drawn first where all would be too many: the drum still, the policy named first, the best of each knowledge."""
     subsets: list[Subset]
     pairs: list[list[Pair | None]]
     """Of each policy (second index) beside each reference (first index); None beside itself or a perfect one."""
@@ -210,10 +212,13 @@ def _reference(entries: Sequence[Entry], left: list[FloatArray]) -> int:
 
 
 def _featured(entries: Sequence[Entry], left: list[FloatArray]) -> list[int]:
+    medians = [float(np.median(values)) for values in left]
     best: dict[Knowledge, int] = {}
-    for i in sorted(range(len(entries)), key=lambda i: float(np.median(left[i]))):
-        best.setdefault(entries[i].knows, i)
-    return sorted(best.values())
+    for i in sorted(range(len(entries)), key=medians.__getitem__):
+        # One that removes next to nothing would only hide the drum still.
+        if medians[i] < REMOVES_NOTHING:
+            best.setdefault(entries[i].knows, i)
+    return sorted({0, min(1, len(entries) - 1), *best.values()})
 
 
 def numbers(values: npt.ArrayLike, digits: int = 4) -> Numbers:

@@ -56,6 +56,10 @@ def remarks(comparison: Comparison, field: Field, episodes: Episodes, index: int
     return found or ["Nothing out of the ordinary."]
 
 
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f}\u00a0%"
+
+
 def _rope(episodes: Episodes, index: int) -> list[str]:
     found = []
     if episodes.parted[index]:
@@ -74,10 +78,12 @@ def _winch(comparison: Comparison, episodes: Episodes, index: int) -> list[str]:
     at_acceleration = float(np.mean(abs(np.diff(speed)) > 0.999 * winch.max_acceleration * CONTROL_PERIOD))
     found = []
     if at_speed > AT_LIMIT:
-        found.append(f"The drum was at its speed limit ({winch.max_rope_speed:g} m/s) for {at_speed:.0%} of the time.")
+        found.append(
+            f"The drum was at its speed limit ({winch.max_rope_speed:g} m/s) for {_percent(at_speed)} of the time."
+        )
     if at_acceleration > AT_LIMIT:
         limit = f"{winch.max_rope_acceleration:g} m/s²"
-        found.append(f"The drum was at its acceleration limit ({limit}) for {at_acceleration:.0%} of the time.")
+        found.append(f"The drum was at its acceleration limit ({limit}) for {_percent(at_acceleration)} of the time.")
     return found
 
 
@@ -87,13 +93,15 @@ def _scenario(field: Field, index: int) -> list[str]:
     masses = np.array([t.load_mass for t in field.traits])
     found = []
     if still[index] >= np.quantile(still, 1.0 - TAIL):
-        found.append(f"One of the {TAIL:.0%} largest motions: {still[index]:.2f} m RMS with the drum still.")
+        found.append(f"One of the {_percent(TAIL)} largest motions: {still[index]:.2f} m RMS with the drum still.")
     if still[index] <= np.quantile(still, TAIL):
-        found.append(f"One of the {TAIL:.0%} smallest motions: {100 * still[index]:.1f} cm RMS with the drum still.")
+        found.append(
+            f"One of the {_percent(TAIL)} smallest motions: {100 * still[index]:.1f} cm RMS with the drum still."
+        )
     if lengths[index] <= np.quantile(lengths, TAIL):
-        found.append(f"One of the {TAIL:.0%} shortest ropes: {traits.rope_length:.0f} m.")
+        found.append(f"One of the {_percent(TAIL)} shortest ropes: {traits.rope_length:.0f} m.")
     if masses[index] <= np.quantile(masses, TAIL):
-        found.append(f"One of the {TAIL:.0%} lightest loads: {traits.load_mass / 1e3:.0f} t.")
+        found.append(f"One of the {_percent(TAIL)} lightest loads: {traits.load_mass / 1e3:.0f} t.")
     return found
 
 
@@ -109,7 +117,7 @@ def _residual(episodes: Episodes, traits: Traits, index: int) -> list[str]:
         found.append(f"Most of the error is a standing one, {100 * mean:+.1f} cm in the mean.")
     early = float(square[: round(START / CONTROL_PERIOD)].sum()) / total
     if early > 0.5:
-        found.append(f"{early:.0%} of Ω1 comes from the first {START:g} s: the start.")
+        found.append(f"{_percent(early)} of Ω1 comes from the first {START:g} s: the start.")
     frequency, density = periodogram(detrend(error), fs=1.0 / CONTROL_PERIOD, window="hann")
     peak = 1.0 / float(frequency[1 + np.argmax(density[1:])])
     if abs(peak - traits.rope_period) < NEAR * traits.rope_period:

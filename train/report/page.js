@@ -16,8 +16,8 @@
   // ---- words ----------------------------------------------------------------------------------------------------
 
   const minus = (text) => text.replace("-", "−");
-  const percent = (share) => minus((100 * share).toFixed(share > 0.99 && share < 1 ? 2 : 1)) + " %";
-  const short = (share) => minus(String(Number((100 * share).toPrecision(6)))) + " %";
+  const percent = (share) => minus((100 * share).toFixed(share > 0.99 && share < 1 ? 2 : 1)) + "\u00a0%";
+  const short = (share) => minus(String(Number((100 * share).toPrecision(6)))) + "\u00a0%";
   const rounded = (value, digits = 3) => minus(String(Number(value.toPrecision(digits))));
   const signed = (value) => (value > 0 ? "+" : "") + minus(value.toFixed(2));
 
@@ -85,6 +85,19 @@
     });
   }
 
+  const DECADES = Array.from({ length: 40 }, (_, index) => index - 20);
+
+  // A logarithmic axis from low to high; figures at 1, 2, 5, or where there is little room at 1 alone.
+  function logAxis(title, low, high, sparse, extra = {}) {
+    const ticks = DECADES.flatMap((decade) => (sparse ? [1] : [1, 2, 5]).map((digit) => Number(`${digit}e${decade}`)));
+    const shown = ticks.filter((tick) => tick >= low && tick <= high);
+    return axis(title, {
+      type: "log", range: [Math.log10(low), Math.log10(high)], tickmode: "array", tickvals: shown,
+      ticktext: shown.map((tick) => (tick >= 1e-4 && tick < 1e5 ? rounded(tick) : `10<sup>${minus(String(Math.round(Math.log10(tick))))}</sup>`)),
+      ...extra,
+    });
+  }
+
   // ---- policies to tick -----------------------------------------------------------------------------------------
 
   // What is drawn of a section's policies: a set that its checkboxes change.
@@ -142,32 +155,38 @@
   function profiles(section, chosen) {
     const curves = inOrder(chosen).map((policy) => [policy, report.subsets[subset].profiles[policy]]);
     draw(section.querySelector(".plot"), curves.map(([policy, { x, y }]) => ({
-      x, y, name: marked(policy), mode: "lines", line: { ...line(policy, 2.2), shape: "hv" },
-      text: x.map((left) => percent(1 - left)),
+      // From nobody at its best, through the steps, to everybody out to the edge.
+      x: [x[0], ...x, 100 * Math.max(1, x.at(-1))], y: [0, ...y, 1], name: marked(policy), mode: "lines", line: { ...line(policy, 2.2), shape: "hv" },
+      text: [x[0], ...x, x.at(-1)].map((left) => percent(1 - left)),
       hovertemplate: "%{fullData.name}: at least %{text} in %{y:.1%}<extra></extra>",
     })), {
       xaxis: reductionAxis("heave reduction", curves.flatMap(([, { x }]) => x), narrow()),
-      yaxis: axis("share of scenarios", { range: [0, 1.02], tickformat: ".0%" }),
+      yaxis: axis("share of scenarios", {
+        range: [0, 1.02], tickvals: [0, 0.2, 0.4, 0.6, 0.8, 1], ticktext: [0, 0.2, 0.4, 0.6, 0.8, 1].map(short),
+      }),
     });
   }
 
   function pairs(section) {
     const reference = Number(element("reference").value);
     const found = everyone.map((policy) => [policy, report.pairs[reference][policy]]).filter(([, pair]) => pair);
-    found.sort(([, a], [, b]) => a.ratio.median - b.ratio.median);
+    // Privileged policies stand apart, below all others.
+    const rank = ([policy]) => (report.policies[policy].privileged ? 1 : 0);
+    found.sort((a, b) => rank(a) - rank(b) || a[1].ratio.median - b[1].ratio.median);
+    const ends = found.flatMap(([, pair]) => [...pair.spread, pair.ratio.low, pair.ratio.high]);
     const places = found.map((_, place) => found.length - 1 - place);
     const traces = found.flatMap(([policy, pair], index) => [
-      { x: pair.spread, y: [places[index], places[index]], mode: "lines", line: { color: tint(policy), width: 1.2 }, hoverinfo: "skip" },
-      { x: [pair.ratio.low, pair.ratio.high], y: [places[index], places[index]], mode: "lines", line: { color: tint(policy), width: 6 }, hoverinfo: "skip" },
+      { x: pair.spread, y: [places[index], places[index]], mode: "lines", line: { color: tint(policy), width: 1.5 }, hoverinfo: "skip" },
+      { x: [pair.ratio.low, pair.ratio.high], y: [places[index], places[index]], mode: "lines", line: { color: tint(policy), width: 10 }, opacity: 0.5, hoverinfo: "skip" },
       {
         x: [pair.ratio.median], y: [places[index]], mode: "markers", name: marked(policy),
-        marker: { color: report.policies[policy].privileged ? colour("ground") : tint(policy), size: 11, line: { color: tint(policy), width: 2 } },
+        marker: { color: report.policies[policy].privileged ? colour("ground") : tint(policy), size: 8, line: { color: tint(policy), width: 2 } },
         hovertemplate: `%{fullData.name}: %{x:.3g} times the RMS error<br>better in ${percent(pair.better)}<extra></extra>`,
       },
     ]);
     section.querySelector(".plot").style.height = `${Math.max(10, 5 + found.length * (narrow() ? 2.9 : 2.1))}rem`;
     draw(section.querySelector(".plot"), traces, {
-      xaxis: axis(`RMS error over that of ${escaped(report.policies[reference].name)}`, { type: "log", dtick: narrow() ? 1 : "D2" }),
+      xaxis: logAxis("RMS error over the reference's", Math.min(0.5, ...ends) / 1.3, Math.max(2, ...ends) * 1.3, narrow()),
       yaxis: axis("", {
         tickmode: "array", tickvals: places, range: [-0.6, found.length - 0.4], showgrid: false,
         ticktext: found.map(([policy]) => wrapped(marked(policy), narrow() ? 16 : 40)),
@@ -234,7 +253,7 @@
     const shown = inOrder(chosen).filter((policy) => ran.has(policy)).map((policy) => ran.get(policy));
     const rows = [
       ["error", "depth error, m", "y", 1],
-      ["error", "magnified, cm", "y2", 100],
+      ["error", "the same, cm", "y2", 100],
       ["rope_speed", "rope paid out, m/s", "y3", 1],
       ["tension", "rope tension, kN", "y4", 1],
     ];
@@ -265,13 +284,16 @@
   }
 
   function spectra(section, chosen) {
+    const curves = report.subsets[subset].spectra;
+    const [lowest, highest] = [curves[0].x[0], curves[0].x.at(-1)];
+    const top = Math.max(...curves.flatMap(({ y }) => y));
     draw(section.querySelector(".plot"), inOrder(chosen).map((policy) => ({
       ...report.subsets[subset].spectra[policy], name: marked(policy), mode: "lines", line: line(policy),
       text: report.subsets[subset].spectra[policy].x.map((frequency) => `${rounded(frequency)} Hz (${rounded(1 / frequency)} s)`),
       hovertemplate: "%{fullData.name} at %{text}: %{y:.2e} m²/Hz<extra></extra>",
     })), {
-      xaxis: axis("frequency, Hz", { type: "log", dtick: narrow() ? 1 : "D2" }),
-      yaxis: axis("spectral density, m²/Hz", { type: "log", exponentformat: "power", dtick: narrow() ? 2 : 1 }),
+      xaxis: logAxis("frequency, Hz", lowest, highest, narrow()),
+      yaxis: logAxis("spectral density, m²/Hz", top * 1e-11, top * 2, true),
     });
   }
 
@@ -282,7 +304,7 @@
     holder.replaceChildren(...report.worst[policy].map((episode, rank) => {
       const article = Object.assign(document.createElement("article"), { className: "episode" });
       const title = document.createElement("h3");
-      title.textContent = `${rank + 1}. Scenario ${episode.scenario}: ${percent(episode.reduction)}`;
+      title.textContent = `${rank + 1}. Scenario ${episode.scenario}: heave reduction ${percent(episode.reduction)}`;
       const facts = document.createElement("p");
       facts.textContent = `${traits(episode.traits)}. RMS ${rounded(100 * episode.rms)} cm, ` +
         `${rounded(100 * episode.still_rms)} cm with the drum still; largest error ${rounded(100 * episode.omega2)} cm.`;

@@ -70,7 +70,7 @@ def _ranges(shown: Content) -> list[tuple[str, float, float]]:
 
 def percent(share: float) -> str:
     """A share in per cent, with a second decimal where it is close to all."""
-    return f"{share:.{2 if 0.99 < share < 1.0 else 1}%}".replace("-", "−").replace("%", " %")
+    return f"{share:.{2 if 0.99 < share < 1.0 else 1}%}".replace("-", "−").replace("%", "\u00a0%")
 
 
 def figure(value: float, digits: int = 3) -> str:
@@ -100,5 +100,3 @@ def _without_nan(data: Any) -> Any:
     if isinstance(data, list | tuple):
         return [_without_nan(value) for value in data]
     return data
-
-
