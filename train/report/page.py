@@ -16,9 +16,10 @@ from plotly.offline import get_plotlyjs
 
 from agents.policy import Knowledge
 from train.comparison import Row
-from train.held_out import DURATION, Comparison
+from train.held_out import Comparison
 from train.output import versions, write_text
 from train.report.content import Content, Subset, content
+from train.tuned_drives import DURATION
 
 MODELS: Final = {"simplified": "simplified (rigid frame)", "rfem": "full (flexible frame, rigid finite elements)"}
 KINDS: Final = (Knowledge.STATE, Knowledge.SENSORS, Knowledge.CLOCK, Knowledge.NOTHING, Knowledge.FUTURE)
