@@ -59,7 +59,9 @@
 
   function draw(figure, traces, layout) {
     const touch = window.matchMedia("(pointer: coarse)").matches;
-    Plotly.react(figure, traces, {
+    // Plotly reads names as HTML.
+    const named = traces.map((trace) => ({ ...trace, ...(trace.name && { name: escaped(trace.name) }) }));
+    Plotly.react(figure, named, {
       showlegend: false, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       font: { family: getComputedStyle(document.body).fontFamily, size: narrow() ? 11 : 12.5, color: colour("text") },
       hoverlabel: { bgcolor: colour("raised"), bordercolor: colour("rule"), font: { color: colour("text") }, namelength: -1 },
@@ -93,7 +95,7 @@
     const shown = ticks.filter((tick) => tick >= low && tick <= high);
     return axis(title, {
       type: "log", range: [Math.log10(low), Math.log10(high)], tickmode: "array", tickvals: shown,
-      ticktext: shown.map((tick) => (tick >= 1e-4 && tick < 1e5 ? rounded(tick) : `10<sup>${minus(String(Math.round(Math.log10(tick))))}</sup>`)),
+      ticktext: shown.map((tick) => (tick >= 0.01 && tick < 1e4 ? rounded(tick) : `10<sup>${minus(String(Math.round(Math.log10(tick))))}</sup>`)),
       ...extra,
     });
   }
@@ -276,11 +278,11 @@
     draw(section.querySelector(".plot"), traces, layout);
   }
 
-  // The scale, cm, at which what a good policy leaves can be seen: that of the shown one that leaves least but one.
+  // The scale, cm, at which what the better half of the policies leaves can be seen.
   function magnified(example, shown) {
     const sorted = [...(shown.length ? shown : example.histories)].sort((a, b) => b.reduction - a.reduction);
-    const second = sorted[Math.min(1, sorted.length - 1)];
-    return 115 * Math.max(...second.error.map(Math.abs), 1e-5);
+    const middle = sorted[Math.floor((sorted.length - 1) / 2)];
+    return 115 * Math.max(...middle.error.map(Math.abs), 1e-5);
   }
 
   function spectra(section, chosen) {
