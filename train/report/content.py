@@ -23,6 +23,8 @@ Numbers = list[float]
 MOST_POINTS: Final = 400
 """Of a curve or a cloud of points; more are thinned out evenly."""
 BINS: Final = 8
+MOST_PLACES: Final = 15
+"""After the decimal point."""
 QUANTILES: Final = {
     0.5: "median",
     0.0: "best",
@@ -212,9 +214,9 @@ def _reference(entries: Sequence[Entry], left: list[FloatArray]) -> int:
 
 
 def _featured(entries: Sequence[Entry], left: list[FloatArray]) -> list[int]:
-    medians = [float(np.median(values)) for values in left]
+    medians, most = [float(np.median(values)) for values in left], len(left[0])
     best: dict[Knowledge, int] = {}
-    for i in sorted(range(len(entries)), key=medians.__getitem__):
+    for i in sorted(range(len(entries)), key=lambda i: (len(left[i]) < most, medians[i])):
         # One that removes next to nothing would only hide the drum still.
         if medians[i] < REMOVES_NOTHING:
             best.setdefault(entries[i].knows, i)
@@ -225,7 +227,7 @@ def numbers(values: npt.ArrayLike, digits: int = 4) -> Numbers:
     """Values rounded to so many digits of the largest one; the page needs no more, and stays small."""
     array = np.asarray(values, dtype=np.float64)
     top = float(np.max(np.abs(array), initial=0.0))
-    places = digits - 1 - math.floor(math.log10(top)) if top > 0.0 else 0
+    places = min(MOST_PLACES, digits - 1 - math.floor(math.log10(top))) if top > 0.0 else 0
     return [float(v) for v in np.round(array, places)]
 
 

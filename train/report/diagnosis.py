@@ -114,7 +114,8 @@ def _residual(episodes: Episodes, traits: Traits, index: int) -> list[str]:
     found = []
     mean = float(error.mean())
     if mean**2 > 0.5 * total / len(error):
-        found.append(f"Most of the error is a standing one, {100 * mean:+.1f} cm in the mean.")
+        standing = f"{100 * mean:+.1f}".replace("-", "−")
+        found.append(f"Most of the error is a standing one, {standing} cm in the mean.")
     early = float(square[: round(START / CONTROL_PERIOD)].sum()) / total
     if early > 0.5:
         found.append(f"{_percent(early)} of Ω1 comes from the first {START:g} s: the start.")

@@ -16,7 +16,7 @@
   // ---- words ----------------------------------------------------------------------------------------------------
 
   const minus = (text) => text.replace("-", "−");
-  const percent = (share) => minus((100 * share).toFixed(share > 0.99 && share < 1 ? 2 : 1)) + "\u00a0%";
+  const percent = (share) => minus((100 * share).toFixed(share > 0.99 && share < 1 ? 2 : share > -1 ? 1 : 0)) + "\u00a0%";
   const short = (share) => minus(String(Number((100 * share).toPrecision(6)))) + "\u00a0%";
   const rounded = (value, digits = 3) => minus(String(Number(value.toPrecision(digits))));
   const signed = (value) => (value > 0 ? "+" : "") + minus(value.toFixed(2));
@@ -66,6 +66,7 @@
       font: { family: getComputedStyle(document.body).fontFamily, size: narrow() ? 11 : 12.5, color: colour("text") },
       hoverlabel: { bgcolor: colour("raised"), bordercolor: colour("rule"), font: { color: colour("text") }, namelength: -1 },
       margin: { l: 52, r: 14, t: 12, b: 44 },
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("quiet"), activecolor: colour("text") },
       // A finger on a picture has to scroll the page.
       dragmode: touch ? false : "zoom",
       ...layout,
@@ -74,25 +75,31 @@
   }
 
   // Heave reduction on an axis that is logarithmic in what is left of the heave, turned so that better is further.
-  const LEFT = [1e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 4, 8, 16, 32];
-  const LEFT_SPARSE = [1e-5, 1e-4, 1e-3, 0.01, 0.1, 1, 10];
+  const DECADES = Array.from({ length: 40 }, (_, index) => index - 20);
+  const BEYOND = 1e9;
+  const MOST_TICKS = 14;
+
+  // Figures 1, 2, 5 of every decade from low to high; where there is little room or they are many, 1 alone.
+  function ticksBetween(low, high, sparse) {
+    const within = (digits) => DECADES.flatMap((decade) => digits.map((digit) => Number(`${digit}e${decade}`)))
+      .filter((tick) => tick >= low && tick <= high);
+    const fine = within([1, 2, 5]);
+    return sparse || fine.length > MOST_TICKS ? within([1]) : fine;
+  }
 
   function reductionAxis(title, values, sparse, extra = {}) {
     const seen = values.filter((value) => value > 0);
     const [low, high] = [Math.min(...seen, 0.5), Math.max(...seen, 1)];
-    const ticks = (sparse ? LEFT_SPARSE : LEFT).filter((left) => left >= low / 1.3 && left <= high * 1.3);
+    const ticks = ticksBetween(low / 1.15, high * 1.15, sparse);
     return axis(title, {
       type: "log", range: [Math.log10(high * 1.15), Math.log10(low / 1.15)],
       tickmode: "array", tickvals: ticks, ticktext: ticks.map((left) => short(1 - left)), ...extra,
     });
   }
 
-  const DECADES = Array.from({ length: 40 }, (_, index) => index - 20);
-
-  // A logarithmic axis from low to high; figures at 1, 2, 5, or where there is little room at 1 alone.
+  // A logarithmic axis from low to high.
   function logAxis(title, low, high, sparse, extra = {}) {
-    const ticks = DECADES.flatMap((decade) => (sparse ? [1] : [1, 2, 5]).map((digit) => Number(`${digit}e${decade}`)));
-    const shown = ticks.filter((tick) => tick >= low && tick <= high);
+    const shown = ticksBetween(low, high, sparse);
     return axis(title, {
       type: "log", range: [Math.log10(low), Math.log10(high)], tickmode: "array", tickvals: shown,
       ticktext: shown.map((tick) => (tick >= 0.01 && tick < 1e4 ? rounded(tick) : `10<sup>${minus(String(Math.round(Math.log10(tick))))}</sup>`)),
@@ -158,7 +165,7 @@
     const curves = inOrder(chosen).map((policy) => [policy, report.subsets[subset].profiles[policy]]);
     draw(section.querySelector(".plot"), curves.map(([policy, { x, y }]) => ({
       // From nobody at its best, through the steps, to everybody out to the edge.
-      x: [x[0], ...x, 100 * Math.max(1, x.at(-1))], y: [0, ...y, 1], name: marked(policy), mode: "lines", line: { ...line(policy, 2.2), shape: "hv" },
+      x: [x[0], ...x, BEYOND], y: [0, ...y, 1], name: marked(policy), mode: "lines", line: { ...line(policy, 2.2), shape: "hv" },
       text: [x[0], ...x, x.at(-1)].map((left) => percent(1 - left)),
       hovertemplate: "%{fullData.name}: at least %{text} in %{y:.1%}<extra></extra>",
     })), {
@@ -288,7 +295,7 @@
   function spectra(section, chosen) {
     const curves = report.subsets[subset].spectra;
     const [lowest, highest] = [curves[0].x[0], curves[0].x.at(-1)];
-    const top = Math.max(...curves.flatMap(({ y }) => y));
+    const top = Math.max(...(chosen.size ? inOrder(chosen) : everyone).flatMap((policy) => curves[policy].y));
     draw(section.querySelector(".plot"), inOrder(chosen).map((policy) => ({
       ...report.subsets[subset].spectra[policy], name: marked(policy), mode: "lines", line: line(policy),
       text: report.subsets[subset].spectra[policy].x.map((frequency) => `${rounded(frequency)} Hz (${rounded(1 / frequency)} s)`),

@@ -25,6 +25,10 @@ MODELS: Final = {"simplified": "simplified (rigid frame)", "rfem": "full (flexib
 KINDS: Final = (Knowledge.STATE, Knowledge.SENSORS, Knowledge.CLOCK, Knowledge.NOTHING, Knowledge.FUTURE)
 """Order of the table's groups: privileged policies come last, apart from all others."""
 
+SMALLEST_PLAIN: Final = 1e-4
+"""Smaller figures are written with a power of ten."""
+RAISED: Final = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
 
 def write_report(path: Path, comparison: Comparison, command: str) -> None:
     """Write the report of a comparison that ``command`` made, all or nothing; it opens in any browser, offline."""
@@ -70,17 +74,20 @@ def _ranges(shown: Content) -> list[tuple[str, float, float]]:
 
 
 def percent(share: float) -> str:
-    """A share in per cent, with a second decimal where it is close to all."""
-    return f"{share:.{2 if 0.99 < share < 1.0 else 1}%}".replace("-", "−").replace("%", "\u00a0%")
+    """A share in per cent: finer where it is close to all, coarser where it is far below nothing."""
+    digits = 2 if 0.99 < share < 1.0 else 1 if share > -1.0 else 0
+    return f"{share:.{digits}%}".replace("-", "−").replace("%", "\u00a0%")
 
 
 def figure(value: float, digits: int = 3) -> str:
-    """A value to so many significant digits, never with an exponent that a plain number can do without."""
-    if value == 0.0 or not math.isfinite(value):
-        return "0" if value == 0.0 else "–"
+    """A value to so many significant digits."""
+    if value == 0.0:
+        return "0"
+    if abs(value) < SMALLEST_PLAIN:
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+        return f"{mantissa}·10{str(int(exponent)).translate(RAISED)}".replace("-", "−")
     places = digits - 1 - math.floor(math.log10(abs(value)))
-    text = f"{round(value, places):,.{max(0, places)}f}" if abs(value) >= 1e-5 else f"{value:.{digits - 1}e}"
-    return text.replace("-", "−")
+    return f"{round(value, places):,.{max(0, places)}f}".replace("-", "−")
 
 
 def _source(name: str) -> str:
