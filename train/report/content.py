@@ -245,19 +245,19 @@ def _subsets(comparison: Comparison) -> list[Subset]:
     counts = {len(entry.episodes.omega1) for entry in entries}
     most, fewest = max(counts), min(counts)
     if most == fewest:
-        return [_subset(f"all {most}", entries)]
+        return [_subset(f"all {most}", entries, comparison.rows)]
     shared = [replace(entry, episodes=_first(entry.episodes, fewest)) for entry in entries]
     return [
-        _subset(f"each policy's own, {fewest} to {most}", entries),
-        _subset(f"the first {fewest}, in which every policy ran", shared),
+        _subset(f"each policy's own, {fewest} to {most}", entries, comparison.rows),
+        _subset(f"the first {fewest}, in which every policy ran", shared, compare(shared, shared[0].episodes)),
     ]
 
 
-def _subset(label: str, entries: Sequence[Entry]) -> Subset:
+def _subset(label: str, entries: Sequence[Entry], figures: list[Row]) -> Subset:
     still = entries[0].episodes
     return Subset(
         label=label,
-        figures=compare(entries, still),
+        figures=figures,
         profiles=[_profile(1.0 - reductions(entry, still)) for entry in entries],
         spectra=[_spectrum(entry.episodes.error) for entry in entries],
     )

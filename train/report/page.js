@@ -18,7 +18,7 @@
   const minus = (text) => text.replace("-", "−");
   const percent = (share) => minus((100 * share).toFixed(share > 0.99 && share < 1 ? 2 : share > -1 ? 1 : 0)) + "\u00a0%";
   const short = (share) => minus(String(Number((100 * share).toPrecision(6)))) + "\u00a0%";
-  const rounded = (value, digits = 3) => minus(String(Number(value.toPrecision(digits))));
+  const rounded = (value) => minus(Math.abs(value) < 1000 ? value.toPrecision(3) : String(Number(value.toPrecision(3))));
   const signed = (value) => (value > 0 ? "+" : "") + minus(value.toFixed(2));
 
   function traits(t) {
@@ -102,7 +102,7 @@
     const shown = ticksBetween(low, high, sparse);
     return axis(title, {
       type: "log", range: [Math.log10(low), Math.log10(high)], tickmode: "array", tickvals: shown,
-      ticktext: shown.map((tick) => (tick >= 0.01 && tick < 1e4 ? rounded(tick) : `10<sup>${minus(String(Math.round(Math.log10(tick))))}</sup>`)),
+      ticktext: shown.map((tick) => (tick >= 0.01 && tick < 1e4 ? String(tick) : `10<sup>${minus(String(Math.round(Math.log10(tick))))}</sup>`)),
       ...extra,
     });
   }
