@@ -141,7 +141,7 @@ class TwoPathSACPolicy(SACPolicy):
         latent = self._actor_inputs + self._hidden
         actor.latent_pi = ActorLatent(self._actor_inputs, self._hidden)  # type: ignore[assignment]
         actor.mu = _constant(latent, 0.0)
-        actor.log_std = _constant(latent, -2.5)  # type: ignore[assignment]
+        actor.log_std = _constant(latent, -1.5)  # type: ignore[assignment]
         return actor
 
     def make_critic(self, features_extractor: BaseFeaturesExtractor | None = None) -> ContinuousCritic:
