@@ -34,9 +34,9 @@ LANES: Final = 64
 def drives(objective: Objective, finest: Objective) -> list[tuple[FloatArray, FloatArray]]:
     """Angle and speed at the objective's times of the drum at rest and of a spline that follows the motion."""
     still = np.zeros(len(objective.times))
-    knots = np.linalg.lstsq(
-        spline_matrices(DURATION, INTERVALS, finest.times)[0], required_angle(finest), rcond=None
-    )[0]
+    knots = np.linalg.lstsq(spline_matrices(DURATION, INTERVALS, finest.times)[0], required_angle(finest), rcond=None)[
+        0
+    ]
     angle, speed_ = spline_matrices(DURATION, INTERVALS, objective.times)
     return [(still, still), (angle @ knots, speed_ @ knots)]
 
