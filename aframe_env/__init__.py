@@ -14,7 +14,7 @@ from aframe_env.scenario import Scenario, ScenarioDistribution
 from aframe_env.scenario_file import read_scenario, scenario_text
 from aframe_env.sea import Sea, SeaMotion
 from aframe_env.sensors import Channel, Sensors
-from aframe_env.validation import InvalidValue
+from aframe_env.validation import InvalidValue, SmallRotationWarning
 from aframe_env.vessel import Vessel
 
 ENV_ID = "AFrameHeave-v0"
@@ -42,6 +42,7 @@ __all__ = [
     "Sea",
     "SeaMotion",
     "Sensors",
+    "SmallRotationWarning",
     "Vessel",
     "Winch",
     "read_scenario",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from aframe_env.section import FrameStructure
@@ -120,13 +121,13 @@ class Crane:
         if self.drum_to_pulley == 0.0:
             raise InvalidValue(f"drum_position = {self.drum_position} m: must not be the pulley's place")
 
-    @property
+    @cached_property
     def pulley_position(self) -> Vector:
         """Pulley S, the middle of the top beam, in {D} with the frame rigid, m."""
         angle, height = self.frame.luffing_angle, self.frame.height
         return (height * math.sin(angle), 0.0, height * math.cos(angle))
 
-    @property
+    @cached_property
     def drum_to_pulley(self) -> float:
         """|SH| with the frame rigid, m."""
         return math.dist(self.pulley_position, self.drum_position)

@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
+from aframe_env.dynamics.knots import knot_kernels
 from aframe_env.dynamics.step import step_kernels
-from aframe_env.motion import ComponentMotion, Components, ShipMotion, TabledMotion
+from aframe_env.motion import Components, ShipMotion, TabledMotion, has_components
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_integer, require_number
 
@@ -97,6 +98,12 @@ class Engine:
         """Copy ``size`` successive quantities of all rows: (rows, size)."""
         return self._view[:, slot : slot + size].transpose(0, 2, 1).reshape(-1, size)[: self.rows].copy()
 
+    def deck(self) -> FloatArray:
+        """Surge, sway, heave [m], roll, pitch, yaw [rad] of all rows: (rows, 6)."""
+        coordinates = np.empty((self.rows, 6))
+        self._kernels.deck(self._blocks, coordinates)
+        return coordinates
+
     @property
     def blocks(self) -> FloatArray:
         """The array itself, (blocks, slots * lanes); see ``layout``."""
@@ -143,17 +150,20 @@ class Engine:
         """Slots of a row at the start of a scenario: (slots,)."""
         times = self._timing(scenario)
         motion: ShipMotion = scenario.motion
-        if isinstance(motion, ComponentMotion):
+        if has_components(motion):
             components = motion.components()
             record, record_length = -1, 0
+            segments = self._knot_segments(scenario, components, times)
         else:
             components = Components(np.zeros(0), np.zeros((0, 6), dtype=np.complex128))
             record, record_length = self._record(motion, times.segment)
+            segments = 1
         self._make_room(len(components.frequency))
         row = np.zeros(at.slots(self._components))
         _fill_parameters(row, scenario, times)
         row[at.RECORD], row[at.RECORD_LENGTH] = record, record_length
-        _fill_components(row, components, times.segment)
+        row[at.KNOT_SEGMENTS] = segments
+        knot_kernels().write(row, components.frequency, components.response, segments * times.segment)
         self._kernels_of_one.start(row[None], self._components, self._records)
         _place_load(row, scenario)
         self._kernels_of_one.start(row[None], self._components, self._records)
@@ -169,6 +179,16 @@ class Engine:
     def _timing(self, scenario: Scenario) -> Timing:
         return timing(scenario, self.control_period, self._max_inner_step)
 
+    def _knot_segments(self, scenario: Scenario, components: Components, times: Timing) -> int:
+        """Motion segments between two knots of a scenario's motion: a power of two."""
+        return knot_kernels().segments(
+            components.frequency,
+            components.response,
+            scenario.crane.pulley_position,
+            times.segment,
+            float(scenario.ramp),
+        )
+
     def _adopt(self, vector: FloatArray, scenario: Scenario) -> FloatArray:
         """Make room for a row of another engine, and point it at this engine's tables: (slots,)."""
         times = self._timing(scenario)
@@ -179,7 +199,7 @@ class Engine:
             )
         self._make_room((len(vector) - at.ROW_SLOTS) // at.COMPONENT_SLOTS)
         adopted = vector.copy()
-        if not isinstance(scenario.motion, ComponentMotion):
+        if not has_components(scenario.motion):
             adopted[at.RECORD], adopted[at.RECORD_LENGTH] = self._record(scenario.motion, times.segment)
         return adopted
 
@@ -229,19 +249,8 @@ def _fill_parameters(row: FloatArray, scenario: Scenario, times: Timing) -> None
     row[at.RAMP_OFFSET] = 0.0 if scenario.ramp else 1.0
     row[at.CONTROL_PERIOD] = times.segment
     row[at.SUBSTEPS] = times.substeps
+    row[at.INNER_STEP] = times.inner_step
     row[at.HALF_STEP_DECAY] = math.exp(-0.5 * times.inner_step / winch.lag) if winch.lag else 0.0
-
-
-def _fill_components(row: FloatArray, components: Components, segment: float) -> None:
-    slots = row[at.ROW_SLOTS :].reshape(-1, at.COMPONENT_SLOTS)
-    count = len(components.frequency)
-    slots[:, at.PHASE_RE] = 1.0
-    slots[:, at.TURN_RE] = 1.0
-    slots[:count, at.TURN_RE] = np.cos(components.frequency * segment)
-    slots[:count, at.TURN_IM] = np.sin(components.frequency * segment)
-    slots[:count, at.FREQUENCY] = components.frequency
-    slots[:count, at.RESPONSE : at.RESPONSE + 6] = components.response.real
-    slots[:count, at.RESPONSE + 6 : at.RESPONSE + 12] = components.response.imag
 
 
 def _place_load(row: FloatArray, scenario: Scenario) -> None:

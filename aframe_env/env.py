@@ -103,6 +103,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     `foot_reactions` (2, 3) [N], forces on the frame at A_R and A_L; `servomotor_tensions` (2,) [N] of S_R and S_L;
     `utilisation`, the largest von Mises stress between two rfes over the yield strength. The pulley of the
     observation is the one of the rigid frame in both models: it is what a motion reference unit on the deck tells.
+    The full model takes the rotation of an rfe to be small: the first one above 0.05 rad makes a
+    `SmallRotationWarning` with the figure.
 
     ## Arguments
     All by keyword, as in `gymnasium.make("AFrameHeave-v0", control_period=0.2)`:

@@ -17,6 +17,7 @@ from aframe_env.dynamics.flexible.step import flexible_kernels
 from aframe_env.dynamics.flexible.tables import step_table
 from aframe_env.dynamics.rfem.chain import Division
 from aframe_env.engine import Engine, FloatArray, Timing
+from aframe_env.motion import Components
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_integer
 
@@ -84,7 +85,7 @@ class FlexibleEngine(Engine):
         self._readout = readout_kernel(self._lanes, rows > at.LANES)
 
     def read_frames(self) -> FloatArray:
-        """Deflection of S, reactions, servomotor tensions and utilisation of all rows: (rows, READOUTS)."""
+        """Deflection of S, reactions, servomotor tensions, utilisation, rotation of all rows: (rows, READOUTS)."""
         result = np.zeros((self.rows, READOUTS))
         self._readout(self._frames, self._readout_tables, result)
         return result
@@ -103,6 +104,10 @@ class FlexibleEngine(Engine):
         comoving = float(scenario.initial == "comoving")
         flexible_kernels(1).start(row[None], frame[None], self._tables, comoving)
         return np.concatenate([frame, row])
+
+    def _knot_segments(self, scenario: Scenario, components: Components, times: Timing) -> int:
+        """One: the frame feels the deck's acceleration, which the quintics give less exactly than its place."""
+        return 1
 
     def write_row(self, index: int, vector: FloatArray) -> None:
         """Overwrite a row with a vector that ``row_vector`` or ``copy_row`` gave."""

@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
+from typing_extensions import TypeIs
 
 from aframe_env.validation import InvalidValue, require_choice, require_number
 
@@ -57,7 +58,6 @@ class Components:
         )
 
 
-@runtime_checkable
 class ComponentMotion(Protocol):
     """A ship motion that is a sum of components."""
 
@@ -66,7 +66,6 @@ class ComponentMotion(Protocol):
         ...
 
 
-@runtime_checkable
 class TabledMotion(Protocol):
     """A ship motion that is known on a table of times."""
 
@@ -83,9 +82,19 @@ class TabledMotion(Protocol):
 ShipMotion = ComponentMotion | TabledMotion
 
 
+# Attributes, not isinstance: with a protocol that costs as much as the rest of a row's reset.
+def has_components(motion: Any) -> TypeIs[ComponentMotion]:
+    """Whether a motion is a sum of components."""
+    return callable(getattr(motion, "components", None))
+
+
+def is_tabled(motion: Any) -> TypeIs[TabledMotion]:
+    """Whether a motion is known on a table of times."""
+    return callable(getattr(motion, "table", None)) and hasattr(motion, "duration")
+
+
 def require_coverage(motion: ShipMotion, name: str, duration: float) -> None:
     """Raise unless the motion is known for ``duration`` s, which the user calls ``name``."""
-    # An attribute, not isinstance: with a protocol that costs as much as the rest of a row's reset.
     known = getattr(motion, "duration", math.inf)
     if known < duration * (1.0 - 1e-9):
         raise InvalidValue(

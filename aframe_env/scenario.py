@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 
 from aframe_env.crane import GRAVITY, Crane
-from aframe_env.motion import ComponentMotion, HarmonicMotion, ShipMotion, TabledMotion
+from aframe_env.motion import HarmonicMotion, ShipMotion, has_components, is_tabled
 from aframe_env.sea import Sea, SeaMotion, dnv_gamma
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
 from aframe_env.vessel import Vessel
@@ -45,7 +46,7 @@ class Scenario:
     def __post_init__(self) -> None:
         if not isinstance(self.crane, Crane):
             raise InvalidValue(f"crane = {self.crane!r}: must be a Crane")
-        if not isinstance(self.motion, ComponentMotion | TabledMotion):
+        if not (has_components(self.motion) or is_tabled(self.motion)):
             raise InvalidValue(f"motion = {self.motion!r}: must be a ship motion (HarmonicMotion, SeaMotion, ...)")
         require_number("load_mass", self.load_mass, "kg", low=0.0, high=1e7, low_open=True)
         require_number("target_level", self.target_level, "m")
@@ -83,11 +84,10 @@ class Scenario:
         """Weight of the load, N."""
         return self.load_mass * self.gravity
 
-    @property
+    @cached_property
     def free_length(self) -> float:
         """l_0, m: unstretched length between drum and load that holds the load at its target, ship at rest."""
-        strain = self.weight / self.crane.rope.axial_stiffness
-        return (self.rope_length + self.crane.drum_to_pulley) / (1.0 + strain)
+        return free_length(self.crane, self.rope_length, self.weight)
 
     @property
     def rope_stiffness(self) -> float:
@@ -98,6 +98,11 @@ class Scenario:
     def rope_frequency(self) -> float:
         """Angular frequency of the load bobbing on the rope, rad/s."""
         return math.sqrt(self.rope_stiffness / self.load_mass)
+
+
+def free_length(crane: Crane, rope_length: float, weight: float) -> float:
+    """Unstretched length between drum and a load of ``weight`` N that hangs ``rope_length`` m below the pulley, m."""
+    return (rope_length + crane.drum_to_pulley) / (1.0 + weight / crane.rope.axial_stiffness)
 
 
 def _require_range(name: str, value: Range, unit: str, low: float, high: float, low_open: bool = False) -> None:
@@ -189,15 +194,17 @@ class ScenarioDistribution:
             components=self.components,
             seed=int(s[4] * 2**53),
         )
-        scenario = Scenario(
+        load_mass, rope_length = _draw(self.load_mass, m[0]), _draw(self.rope_length, r[0])
+        weight = load_mass * GRAVITY
+        stiffness = self.crane.rope.axial_stiffness / free_length(self.crane, rope_length, weight)
+        return Scenario(
             crane=self.crane,
             motion=SeaMotion(sea=sea, vessel=self.vessel),
-            load_mass=_draw(self.load_mass, m[0]),
-            target_level=self.crane.pulley_position[2] - _draw(self.rope_length, r[0]),
+            load_mass=load_mass,
+            target_level=self.crane.pulley_position[2] - rope_length,
+            rope_damping=_draw(self.rope_damping_ratio, r[1]) * 2.0 * math.sqrt(stiffness * load_mass),
             ramp=self.ramp,
         )
-        critical = 2.0 * scenario.load_mass * scenario.rope_frequency
-        return replace(scenario, rope_damping=_draw(self.rope_damping_ratio, r[1]) * critical)
 
 
 ScenarioSource = Scenario | ScenarioDistribution

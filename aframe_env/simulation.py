@@ -12,6 +12,8 @@ from gymnasium import spaces
 
 from aframe_env import task
 from aframe_env.dynamics import layout as at
+from aframe_env.dynamics.flexible.readout import ROTATION
+from aframe_env.dynamics.rfem.model import warn_of_rotation
 from aframe_env.engine import Engine
 from aframe_env.flexible_engine import FlexibleEngine, Mesh, mesh_of
 from aframe_env.motion import require_coverage
@@ -83,6 +85,7 @@ class Simulation:
         self.steps = np.zeros(rows, dtype=np.int64)
         self.state = np.zeros((rows, len(task.STATE)))
         self.results = np.zeros((rows, task.RESULTS))
+        self._warned = False
 
     def __getstate__(self) -> dict[str, Any]:
         return {k: v for k, v in self.__dict__.items() if k != "_report"}
@@ -92,8 +95,17 @@ class Simulation:
         self._report = task.report_kernel(self._engine.lanes)
 
     def frames(self) -> FloatArray | None:
-        """Readout of the rows' frames, (rows, READOUTS); None for the simplified model."""
-        return self._engine.read_frames() if isinstance(self._engine, FlexibleEngine) else None
+        """Readout of the rows' frames, (rows, READOUTS); None for the simplified model.
+
+        Warns:
+            SmallRotationWarning: An rfe turns by more than 0.05 rad; once in the life of these rows.
+        """
+        if not isinstance(self._engine, FlexibleEngine):
+            return None
+        frames = self._engine.read_frames()
+        if not self._warned:
+            self._warned = warn_of_rotation(float(frames[:, ROTATION].max()))
+        return frames
 
     @property
     def engine(self) -> Engine:
@@ -135,8 +147,9 @@ class Simulation:
         values = self.state
         if self._bank is not None:
             values = np.concatenate([self._bank.readings, self._known()], axis=1)
-        clipped = np.clip(values, self._low, self._high)
-        return clipped.astype(np.float32)
+        observation = np.empty(values.shape, dtype=np.float32)
+        task.clip(values, self._low, self._high, observation)
+        return observation
 
     def copy_row(self, index: int) -> RowState:
         """Return the state of a row."""
@@ -170,4 +183,4 @@ class Simulation:
         return np.stack([mass, self._engine.read(at.FREE_LENGTH)], axis=1)
 
     def _sensed_truth(self) -> FloatArray:
-        return task.sensed_truth(self.state, self._engine.read_many(at.MOTION + 3, 2))
+        return task.sensed_truth(self.state, self._engine.deck()[:, 3:5])

@@ -174,6 +174,16 @@ def report_kernel(lanes: int) -> Callable[..., None]:
     return report
 
 
+@kernel
+def clip(values: Any, low: Any, high: Any, observation: Any) -> None:
+    """Round values (N, K) float64 into an observation (N, K) float32, within low and high (K,) float32."""
+    for i in range(values.shape[0]):
+        for k in range(values.shape[1]):
+            value = np.float32(values[i, k])
+            value = low[k] if value < low[k] else value
+            observation[i, k] = high[k] if value > high[k] else value
+
+
 def frame_info(frames: npt.NDArray[np.float64]) -> dict[str, Any]:
     """What the information of an environment says of the frames, from their readout (rows, READOUTS)."""
     return {

@@ -7,6 +7,10 @@ from numbers import Real
 from typing import Any
 
 
+class SmallRotationWarning(UserWarning):
+    """An rfe of the full model has turned by more than the linear kinematics of eq. (10) can take."""
+
+
 class InvalidValue(ValueError):
     """A value outside what the model can take. The message names it, its range and its unit."""
 
@@ -27,6 +31,8 @@ def require_number(
     low_open: bool = False,
 ) -> None:
     """Raise unless ``value`` is a finite real number in [low, high] (or (low, high])."""
+    if type(value) is float and low < value < high:
+        return
     allowed = f"{_interval(low, high, low_open)} {unit}".rstrip()
     if isinstance(value, bool) or not isinstance(value, Real):
         raise InvalidValue(f"{name} = {value!r}: must be a number in {allowed}")

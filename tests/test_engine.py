@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from aframe_env import Crane, HarmonicMotion, Rope, Scenario, ScenarioDistribution, Winch
+from aframe_env import Crane, Harmonic, HarmonicMotion, Rope, Scenario, ScenarioDistribution, Winch
 from aframe_env.dynamics import layout as at
 from aframe_env.engine import Engine, timing
 
@@ -28,20 +28,28 @@ def histories(scenarios: list[Scenario], commands: npt.NDArray[np.float64]) -> n
 
 
 def mixed_rows() -> list[Scenario]:
-    """Rows of 5, 5 and over 50 inner steps, still and moving, slack at times."""
+    """Rows of 5, 5 and over 50 inner steps, of knots 0.4, 0.2 and 0.1 s apart, still and moving, slack at times."""
     light = Scenario(motion=HarmonicMotion(), load_mass=200.0, target_level=-5.0, crane=FAST)
     return [
         Scenario.paper(initial="rest"),
         replace(Scenario.paper(), crane=FAST, load_mass=2e4, target_level=-150.0),
         replace(light, rope_damping=50.0),
+        *(heaving(period) for period in (2.0, 1.0)),
         *(ScenarioDistribution().draw(np.random.default_rng(k)) for k in range(5)),
     ]
+
+
+def heaving(period: float) -> Scenario:
+    """Half a metre of heave at a period [s]."""
+    return Scenario(motion=HarmonicMotion(harmonics=(Harmonic(coordinate="heave", amplitude=0.5, period=period),)))
 
 
 def test_row_is_the_same_alone_and_in_any_batch() -> None:
     scenarios = mixed_rows()
     assert timing(scenarios[2], 0.1).substeps > 10 * timing(scenarios[0], 0.1).substeps
     commands = np.random.default_rng(1).uniform(-4.0, 4.0, (100, len(scenarios)))
+    knots = [Engine(1, 0.1).row_vector(s)[at.KNOT_SEGMENTS] for s in scenarios]
+    assert {1.0, 2.0, 4.0} <= set(knots)
     together = histories(scenarios, commands)
     for k, scenario in enumerate(scenarios):
         alone = histories([scenario], commands[:, k : k + 1])[:, 0]
@@ -70,4 +78,7 @@ def test_any_number_of_components(components: int) -> None:
     assert not after.any()
     factor = np.arange(1, 21) * 0.1 / wide.ramp
     factor = factor**3 * (10 - 15 * factor + 6 * factor**2)
-    np.testing.assert_allclose(together[:, 1, at.MOTION : at.MOTION + 6], factor[:, None] * exact[0], atol=1e-12)
+    knots = np.arange(3, 20, 4)
+    np.testing.assert_array_equal(together[knots, 1, at.KNOT_STEP], knots + 1)
+    got, want = together[knots, 1, at.KNOT : at.KNOT + 6], (factor[:, None] * exact[0])[knots]
+    np.testing.assert_allclose(got, want, atol=1e-12)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from aframe_env import InvalidValue, Scenario
+from aframe_env import InvalidValue, Scenario, SmallRotationWarning
 from aframe_env.crane import Crane
 from aframe_env.dynamics.rfem.chain import Division
 from aframe_env.dynamics.rfem.model import frame_model
@@ -109,6 +109,30 @@ def test_rows_may_have_different_cranes_and_ropes():
             row = scalar.step(np.full(1, 0.5, dtype=np.float32))
         np.testing.assert_array_equal(rows[0][k], row[0])
         np.testing.assert_array_equal(rows[4]["foot_reactions"][k], row[4]["foot_reactions"])
+
+
+def test_a_frame_that_turns_too_far_warns_once_with_the_figure():
+    soft = Scenario.paper(crane=stiffer(0.05))
+    static = frame_model(soft.crane.frame, Division(leg=5, beam=2))
+    to_drum = np.array(soft.crane.drum_position) - np.array(soft.crane.pulley_position)
+    force = 981e3 * (to_drum / np.linalg.norm(to_drum) - np.array([0.0, 0.0, 1.0]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SmallRotationWarning)
+        position = soft.crane.static(LoadCase(forces={"S": tuple(force.tolist())}), model=static).position
+        largest = np.linalg.norm(position.reshape(-1, 6)[:, 3:], axis=1).max()
+    scalar = gymnasium.make("AFrameHeave-v0", scenario=soft, **MESH)
+    with pytest.warns(SmallRotationWarning, match=r"turned by 0\.\d+ rad") as caught:
+        scalar.reset(seed=0)
+    for _ in range(5):
+        scalar.step(STILL)  # A second warning would be an error.
+    figure = float(str(caught[0].message).split("turned by ")[1].split()[0])
+    assert figure == pytest.approx(largest, rel=0.05)
+    vector = gymnasium.make_vec("AFrameHeave-v0", num_envs=3, vectorization_mode="vector_entry_point", **MESH)
+    vector.reset(seed=0)
+    with pytest.warns(SmallRotationWarning) as caught:
+        vector.reset(options={"scenario": [Scenario.paper(), soft, soft]})
+    assert len(caught) == 1
+    vector.step(np.zeros((3, 1), dtype=np.float32))
 
 
 def test_a_section_without_stress_points_has_no_utilisation():

@@ -17,7 +17,9 @@ def first_table(path):
     return lines[begin:end]
 
 
-@pytest.mark.parametrize("name", ["results/ppo/comparison.md", "results/drives-paper/notes.md"])
+@pytest.mark.parametrize(
+    "name", ["results/ppo/comparison.md", "results/drives-paper/notes.md", "results/verification/README.md"]
+)
 def test_tables_are_those_of_the_results(name):
     for line in first_table(ROOT / name):
         assert line in README

@@ -8,7 +8,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from numba import njit
+from numba import njit, types
+from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -30,6 +31,27 @@ def kernel(function: F) -> F:
 def parallel_kernel(function: F) -> F:
     """Compile a loop over rows that spreads over the cores, cached on disk."""
     return cast(F, njit(cache=True, parallel=True, **_OPTIONS)(function))
+
+
+def _fused(typing_context, a, b, c):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        doubles = [
+            context.cast(builder, value, own, signature.return_type)
+            for value, own in zip(arguments, signature.args, strict=True)
+        ]
+        return builder.fma(*doubles)
+
+    return types.float64(a, b, c), generate
+
+
+_fused_multiply_add: Any = intrinsic(_fused)
+
+
+@scalar
+def fma(a: float, b: float, c: float) -> float:
+    """a b + c, rounded once: half the instructions, and the same bits however the compiler arranges the loop."""
+    result: float = _fused_multiply_add(a, b, c)
+    return result
 
 
 @cache

@@ -8,10 +8,20 @@ quantities overlap, and so it vectorises the loop over lanes. All float64, SI.
 from __future__ import annotations
 
 from itertools import count
-from typing import Final
+from typing import Final, NamedTuple
 
 LANES: Final = 64
 """Rows in a block."""
+
+
+class Span(NamedTuple):
+    """Which lanes of a block to go through."""
+
+    stride: int
+    """Lanes in the block."""
+    begin: int
+    end: int
+
 
 _next = count().__next__
 
@@ -32,10 +42,18 @@ LOAD_VELOCITY: Final = _take(3)
 DRUM_ANGLE: Final = _take(1)
 DRUM_SPEED: Final = _take(1)
 COMMAND: Final = _take(1)
-MOTION: Final = _take(18)
-"""Deck: six coordinates (surge, sway, heave, roll, pitch, yaw), their rates, their accelerations."""
 PULLEY: Final = _take(9)
 """Pulley S in the base frame: position, velocity, acceleration."""
+KNOT_STEP: Final = _take(1)
+"""Motion segments from the start to the next knot of the deck's motion."""
+KNOT: Final = _take(18)
+"""Deck at the next knot: six coordinates, their rates, their accelerations."""
+KNOT_PULLEY: Final = _take(9)
+"""Pulley at the next knot: position, velocity, acceleration."""
+KNOT_BEFORE: Final = _take(18)
+"""Deck at the knot before."""
+PATH: Final = _take(18)
+"""Quintic through the pulley's path from knot to knot: coefficients 0..5 for each axis (axis-major)."""
 OMEGA1: Final = _take(1)
 OMEGA2: Final = _take(1)
 STEP_COST: Final = _take(1)
@@ -71,7 +89,11 @@ RAMP_RATE: Final = _take(1)
 RAMP_OFFSET: Final = _take(1)
 CONTROL_PERIOD: Final = _take(1)
 """Length of one motion segment (a control step, or an equal part of a long one)."""
+KNOT_SEGMENTS: Final = _take(1)
+"""Motion segments from knot to knot."""
 SUBSTEPS: Final = _take(1)
+INNER_STEP: Final = _take(1)
+"""CONTROL_PERIOD / SUBSTEPS."""
 HALF_STEP_DECAY: Final = _take(1)
 """exp(-h / (2 lag)): decay of the winch's speed error over half an inner step; 0 without lag."""
 RECORD: Final = _take(1)
@@ -79,10 +101,10 @@ RECORD: Final = _take(1)
 RECORD_LENGTH: Final = _take(1)
 
 # Scratch of one control step.
-PATH: Final = _take(18)
-"""Quintic through the pulley's path: coefficients 0..5 for each axis (axis-major)."""
-TIP: Final = _take(6)
-"""Pulley's position and velocity at the start of the inner step."""
+DUE: Final = _take(1)
+"""1 where the row has come to its knot."""
+ELAPSED: Final = _take(1)
+"""Time from the knot before to the start of the segment."""
 WINCH: Final = _take(7)
 """Plan of the winch: direction, ramp time, start of decay, first decaying half step, error, start angle, speed."""
 

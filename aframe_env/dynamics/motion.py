@@ -1,21 +1,27 @@
 """Motion of the deck and of the pulley on it, over a block of rows.
 
-Each wave component is a complex number of modulus one, turned by one constant factor a control step: no sine in
-the loop. Rounding drifts by about 1e-16 a step, 1e-11 after ten hours of 0.1 s steps. Between the two ends of a
-control step T the pulley follows the quintic through position, velocity and acceleration at both ends; for a
-component of amplitude A and frequency ω its error is at most A (ωT)^6 / 46080 (5e-9 A at 2.5 rad/s and 0.1 s).
+The waves are summed at knots, up to four motion segments apart: each component is a complex number of modulus one,
+turned by one constant factor from knot to knot, no sine in the loop. Rounding drifts by about 1e-16 a knot, 1e-12
+after ten hours. From knot to knot, T apart, deck and pulley follow the quintic through position, velocity and
+acceleration at both; for a component of amplitude A and frequency ω its error is at most A (ωT)^6 / 46080.
 """
 
 from __future__ import annotations
+
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.compiling import scalar
+from aframe_env.dynamics.compiling import fma, scalar
+from aframe_env.dynamics.layout import Span
 from aframe_env.dynamics.transforms import rotate_pair
 
 Block = npt.NDArray[np.float64]
+
+FEW: Final = 6
+"""Rows of a block that are quicker alone than all the block's together."""
 
 
 @scalar
@@ -31,114 +37,136 @@ def smooth_ramp(time: float, rate: float, offset: float) -> tuple[float, float, 
 
 
 @scalar
-def turn_components(row: Block, components: int, lanes: int) -> None:
-    """Advance the phase of each wave component by one control step."""
-    for k in range(components):
+def turn_components(row: Block, group: int, span: Span) -> None:
+    """Advance the phases of a group of UNROLL wave components to the next knot, in the lanes that are due."""
+    lanes = span.stride
+    for k in range(group * at.UNROLL, (group + 1) * at.UNROLL):
         base = at.ROW_SLOTS + k * at.COMPONENT_SLOTS
-        for j in range(lanes):
+        for j in range(span.begin, span.end):
+            due = row[at.DUE * lanes + j] > 0.0
             re = row[(base + at.PHASE_RE) * lanes + j]
             im = row[(base + at.PHASE_IM) * lanes + j]
             turn_re = row[(base + at.TURN_RE) * lanes + j]
             turn_im = row[(base + at.TURN_IM) * lanes + j]
-            row[(base + at.PHASE_RE) * lanes + j] = re * turn_re - im * turn_im
-            row[(base + at.PHASE_IM) * lanes + j] = re * turn_im + im * turn_re
+            row[(base + at.PHASE_RE) * lanes + j] = fma(re, turn_re, -im * turn_im) if due else re
+            row[(base + at.PHASE_IM) * lanes + j] = fma(re, turn_im, im * turn_re) if due else im
 
 
 @scalar
-def sum_components(row: Block, components: int, lanes: int) -> None:
-    """Deck coordinates, rates and accelerations from the wave components, before the ramp.
+def add_component(
+    a: float, b: float, re: float, im: float, frequency: float, position: float, rate: float, acceleration: float
+) -> tuple[float, float, float]:
+    """Add Re((a + i b) exp(i ω t)) to a coordinate, its rate and its acceleration; re + i im is exp(i ω t)."""
+    part = fma(a, re, -b * im)
+    turned = fma(a, im, b * re)
+    return position + part, fma(-frequency, turned, rate), fma(-frequency * frequency, part, acceleration)
 
-    UNROLL components at a time: the sums stay in registers meanwhile, which halves the cost.
+
+@scalar
+def sum_components(row: Block, components: int, span: Span) -> None:
+    """Turn the wave components and sum deck coordinates, rates and accelerations at the next knot, before the ramp.
+
+    UNROLL components and three coordinates at a time: the sums stay in registers meanwhile, the components in cache.
     """
+    lanes = span.stride
     for i in range(18):
-        for j in range(lanes):
-            row[(at.MOTION + i) * lanes + j] = 0.0
-    for dof in range(6):
-        for group in range(components // at.UNROLL):
-            first = at.ROW_SLOTS + group * at.UNROLL * at.COMPONENT_SLOTS
-            for j in range(lanes):
-                position, rate, acceleration = 0.0, 0.0, 0.0
+        for j in range(span.begin, span.end):
+            row[(at.KNOT + i) * lanes + j] = 0.0
+    for group in range(components // at.UNROLL):
+        turn_components(row, group, span)
+        begin = at.ROW_SLOTS + group * at.UNROLL * at.COMPONENT_SLOTS
+        for first in (0, 3):
+            for j in range(span.begin, span.end):
+                p1, v1, a1, p2, v2, a2, p3, v3, a3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
                 for k in range(at.UNROLL):
-                    base = first + k * at.COMPONENT_SLOTS
+                    base = begin + k * at.COMPONENT_SLOTS
                     re = row[(base + at.PHASE_RE) * lanes + j]
                     im = row[(base + at.PHASE_IM) * lanes + j]
-                    frequency = row[(base + at.FREQUENCY) * lanes + j]
-                    a = row[(base + at.RESPONSE + dof) * lanes + j]
-                    b = row[(base + at.RESPONSE + 6 + dof) * lanes + j]
-                    part = a * re - b * im
-                    position += part
-                    rate -= frequency * (a * im + b * re)
-                    acceleration -= frequency * frequency * part
-                row[(at.MOTION + dof) * lanes + j] += position
-                row[(at.MOTION + 6 + dof) * lanes + j] += rate
-                row[(at.MOTION + 12 + dof) * lanes + j] += acceleration
+                    w = row[(base + at.FREQUENCY) * lanes + j]
+                    real, imaginary = base + at.RESPONSE + first, base + at.RESPONSE + 6 + first
+                    p1, v1, a1 = add_component(row[real * lanes + j], row[imaginary * lanes + j], re, im, w, p1, v1, a1)
+                    p2, v2, a2 = add_component(
+                        row[(real + 1) * lanes + j], row[(imaginary + 1) * lanes + j], re, im, w, p2, v2, a2
+                    )
+                    p3, v3, a3 = add_component(
+                        row[(real + 2) * lanes + j], row[(imaginary + 2) * lanes + j], re, im, w, p3, v3, a3
+                    )
+                c = at.KNOT + first
+                row[c * lanes + j] += p1
+                row[(c + 1) * lanes + j] += p2
+                row[(c + 2) * lanes + j] += p3
+                row[(c + 6) * lanes + j] += v1
+                row[(c + 7) * lanes + j] += v2
+                row[(c + 8) * lanes + j] += v3
+                row[(c + 12) * lanes + j] += a1
+                row[(c + 13) * lanes + j] += a2
+                row[(c + 14) * lanes + j] += a3
 
 
 @scalar
-def read_record(row: Block, records: npt.NDArray[np.float64], lanes: int) -> None:
-    """Deck coordinates of rows that follow a recorded motion: the table's line at the row's time.
+def read_record(row: Block, records: npt.NDArray[np.float64], span: Span) -> None:
+    """Deck coordinates of rows that follow a recorded motion: the table's line at the next knot.
 
     After the last line the deck stands still where that line has it.
     """
-    for j in range(lanes):
+    lanes = span.stride
+    for j in range(span.begin, span.end):
         first = int(row[at.RECORD * lanes + j])
         if first >= 0:
-            line = int(row[at.STEP * lanes + j])
+            line = int(row[at.KNOT_STEP * lanes + j])
             last = int(row[at.RECORD_LENGTH * lanes + j]) - 1
             moving = 1.0 if line <= last else 0.0
             line = line if line < last else last
             for i in range(6):
-                row[(at.MOTION + i) * lanes + j] = records[first + line, i]
+                row[(at.KNOT + i) * lanes + j] = records[first + line, i]
             for i in range(6, 18):
-                row[(at.MOTION + i) * lanes + j] = moving * records[first + line, i]
+                row[(at.KNOT + i) * lanes + j] = moving * records[first + line, i]
 
 
 @scalar
-def place_pulley(row: Block, lanes: int) -> None:
-    """Apply the ramp to the deck's motion, and carry the pulley with the deck, eq. (38)."""
-    for j in range(lanes):
-        r, dr, ddr = smooth_ramp(
-            row[at.TIME * lanes + j], row[at.RAMP_RATE * lanes + j], row[at.RAMP_OFFSET * lanes + j]
-        )
+def place_pulley(row: Block, span: Span) -> None:
+    """Apply the ramp to the deck's motion, and carry the pulley with the deck, eq. (38), at the next knot."""
+    lanes = span.stride
+    for j in range(span.begin, span.end):
+        time = row[at.KNOT_STEP * lanes + j] * row[at.CONTROL_PERIOD * lanes + j]
+        r, dr, ddr = smooth_ramp(time, row[at.RAMP_RATE * lanes + j], row[at.RAMP_OFFSET * lanes + j])
         for dof in range(6):
-            q = row[(at.MOTION + dof) * lanes + j]
-            dq = row[(at.MOTION + 6 + dof) * lanes + j]
-            row[(at.MOTION + dof) * lanes + j] = r * q
-            row[(at.MOTION + 6 + dof) * lanes + j] = r * dq + dr * q
-            row[(at.MOTION + 12 + dof) * lanes + j] = (
-                r * row[(at.MOTION + 12 + dof) * lanes + j] + 2.0 * dr * dq + ddr * q
-            )
-    for j in range(lanes):
+            q = row[(at.KNOT + dof) * lanes + j]
+            dq = row[(at.KNOT + 6 + dof) * lanes + j]
+            row[(at.KNOT + dof) * lanes + j] = r * q
+            row[(at.KNOT + 6 + dof) * lanes + j] = r * dq + dr * q
+            row[(at.KNOT + 12 + dof) * lanes + j] = r * row[(at.KNOT + 12 + dof) * lanes + j] + 2.0 * dr * dq + ddr * q
+    for j in range(span.begin, span.end):
         x = row[at.PULLEY_ON_DECK * lanes + j]
         y = row[(at.PULLEY_ON_DECK + 1) * lanes + j]
         z = row[(at.PULLEY_ON_DECK + 2) * lanes + j]
         angle, rate, acceleration = (
-            row[(at.MOTION + 3) * lanes + j],
-            row[(at.MOTION + 9) * lanes + j],
-            row[(at.MOTION + 15) * lanes + j],
+            row[(at.KNOT + 3) * lanes + j],
+            row[(at.KNOT + 9) * lanes + j],
+            row[(at.KNOT + 15) * lanes + j],
         )
         y, z, dy, dz, ddy, ddz = rotate_pair(y, z, 0.0, 0.0, 0.0, 0.0, angle, rate, acceleration)
         angle, rate, acceleration = (
-            row[(at.MOTION + 4) * lanes + j],
-            row[(at.MOTION + 10) * lanes + j],
-            row[(at.MOTION + 16) * lanes + j],
+            row[(at.KNOT + 4) * lanes + j],
+            row[(at.KNOT + 10) * lanes + j],
+            row[(at.KNOT + 16) * lanes + j],
         )
         z, x, dz, dx, ddz, ddx = rotate_pair(z, x, dz, 0.0, ddz, 0.0, angle, rate, acceleration)
         angle, rate, acceleration = (
-            row[(at.MOTION + 5) * lanes + j],
-            row[(at.MOTION + 11) * lanes + j],
-            row[(at.MOTION + 17) * lanes + j],
+            row[(at.KNOT + 5) * lanes + j],
+            row[(at.KNOT + 11) * lanes + j],
+            row[(at.KNOT + 17) * lanes + j],
         )
         x, y, dx, dy, ddx, ddy = rotate_pair(x, y, dx, dy, ddx, ddy, angle, rate, acceleration)
-        row[at.PULLEY * lanes + j] = x + row[at.MOTION * lanes + j]
-        row[(at.PULLEY + 1) * lanes + j] = y + row[(at.MOTION + 1) * lanes + j]
-        row[(at.PULLEY + 2) * lanes + j] = z + row[(at.MOTION + 2) * lanes + j]
-        row[(at.PULLEY + 3) * lanes + j] = dx + row[(at.MOTION + 6) * lanes + j]
-        row[(at.PULLEY + 4) * lanes + j] = dy + row[(at.MOTION + 7) * lanes + j]
-        row[(at.PULLEY + 5) * lanes + j] = dz + row[(at.MOTION + 8) * lanes + j]
-        row[(at.PULLEY + 6) * lanes + j] = ddx + row[(at.MOTION + 12) * lanes + j]
-        row[(at.PULLEY + 7) * lanes + j] = ddy + row[(at.MOTION + 13) * lanes + j]
-        row[(at.PULLEY + 8) * lanes + j] = ddz + row[(at.MOTION + 14) * lanes + j]
+        row[at.KNOT_PULLEY * lanes + j] = x + row[at.KNOT * lanes + j]
+        row[(at.KNOT_PULLEY + 1) * lanes + j] = y + row[(at.KNOT + 1) * lanes + j]
+        row[(at.KNOT_PULLEY + 2) * lanes + j] = z + row[(at.KNOT + 2) * lanes + j]
+        row[(at.KNOT_PULLEY + 3) * lanes + j] = dx + row[(at.KNOT + 6) * lanes + j]
+        row[(at.KNOT_PULLEY + 4) * lanes + j] = dy + row[(at.KNOT + 7) * lanes + j]
+        row[(at.KNOT_PULLEY + 5) * lanes + j] = dz + row[(at.KNOT + 8) * lanes + j]
+        row[(at.KNOT_PULLEY + 6) * lanes + j] = ddx + row[(at.KNOT + 12) * lanes + j]
+        row[(at.KNOT_PULLEY + 7) * lanes + j] = ddy + row[(at.KNOT + 13) * lanes + j]
+        row[(at.KNOT_PULLEY + 8) * lanes + j] = ddz + row[(at.KNOT + 14) * lanes + j]
 
 
 @scalar
@@ -162,79 +190,158 @@ def quintic(
 
 @scalar
 def on_quintic(c0: float, c1: float, c2: float, c3: float, c4: float, c5: float, t: float) -> tuple[float, float]:
-    """Position and velocity on the quintic."""
-    position = c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
-    velocity = c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * (5.0 * c5))))
+    """Position and velocity on the quintic: Horner's scheme, for the derivative along with the value."""
+    velocity = c5
+    position = fma(t, c5, c4)
+    velocity = fma(t, velocity, position)
+    position = fma(t, position, c3)
+    velocity = fma(t, velocity, position)
+    position = fma(t, position, c2)
+    velocity = fma(t, velocity, position)
+    position = fma(t, position, c1)
+    velocity = fma(t, velocity, position)
+    position = fma(t, position, c0)
     return position, velocity
 
 
 @scalar
-def advance_motion(row: Block, components: int, records: npt.NDArray[np.float64], lanes: int) -> None:
-    """Advance the deck by one segment, and lay the quintic through the pulley's path over it."""
-    for i in range(9):
-        for j in range(lanes):
-            row[(at.PATH + i) * lanes + j] = row[(at.PULLEY + i) * lanes + j]
-    for j in range(lanes):
-        row[at.STEP * lanes + j] += 1.0
-        row[at.TIME * lanes + j] = row[at.STEP * lanes + j] * row[at.CONTROL_PERIOD * lanes + j]
-    turn_components(row, components, lanes)
-    pose_deck(row, components, records, lanes)
-    for j in range(lanes):
-        duration = row[at.CONTROL_PERIOD * lanes + j]
-        p1, p2, p3 = row[at.PATH * lanes + j], row[(at.PATH + 1) * lanes + j], row[(at.PATH + 2) * lanes + j]
-        v1, v2, v3 = (
-            row[(at.PATH + 3) * lanes + j],
-            row[(at.PATH + 4) * lanes + j],
-            row[(at.PATH + 5) * lanes + j],
-        )
-        a1, a2, a3 = (
-            row[(at.PATH + 6) * lanes + j],
-            row[(at.PATH + 7) * lanes + j],
-            row[(at.PATH + 8) * lanes + j],
-        )
-        x = quintic(
-            p1,
-            v1,
-            a1,
-            row[at.PULLEY * lanes + j],
-            row[(at.PULLEY + 3) * lanes + j],
-            row[(at.PULLEY + 6) * lanes + j],
-            duration,
-        )
-        y = quintic(
-            p2,
-            v2,
-            a2,
-            row[(at.PULLEY + 1) * lanes + j],
-            row[(at.PULLEY + 4) * lanes + j],
-            row[(at.PULLEY + 7) * lanes + j],
-            duration,
-        )
-        z = quintic(
-            p3,
-            v3,
-            a3,
-            row[(at.PULLEY + 2) * lanes + j],
-            row[(at.PULLEY + 5) * lanes + j],
-            row[(at.PULLEY + 8) * lanes + j],
-            duration,
-        )
-        for i in range(6):
-            row[(at.PATH + i) * lanes + j] = x[i]
-            row[(at.PATH + 6 + i) * lanes + j] = y[i]
-            row[(at.PATH + 12 + i) * lanes + j] = z[i]
-        row[at.TIP * lanes + j], row[(at.TIP + 1) * lanes + j], row[(at.TIP + 2) * lanes + j] = p1, p2, p3
-        row[(at.TIP + 3) * lanes + j], row[(at.TIP + 4) * lanes + j], row[(at.TIP + 5) * lanes + j] = (
-            v1,
-            v2,
-            v3,
-        )
+def bend(c2: float, c3: float, c4: float, c5: float, t: float) -> float:
+    """Second derivative of the quintic."""
+    return 2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5))
 
 
 @scalar
-def pose_deck(row: Block, components: int, records: npt.NDArray[np.float64], lanes: int) -> None:
-    """Deck and pulley at the row's time, from the phases of the components (or the record)."""
-    sum_components(row, components, lanes)
+def on_path(row: Block, axis: int, t: float, lanes: int, j: int) -> tuple[float, float]:
+    """Position and velocity of lane j's pulley along an axis, ``t`` s after the knot before."""
+    c = at.PATH + 6 * axis
+    return on_quintic(
+        row[c * lanes + j],
+        row[(c + 1) * lanes + j],
+        row[(c + 2) * lanes + j],
+        row[(c + 3) * lanes + j],
+        row[(c + 4) * lanes + j],
+        row[(c + 5) * lanes + j],
+        t,
+    )
+
+
+@scalar
+def lay_path(row: Block, span: Span) -> None:
+    """Lay the quintics through the pulley's path up to the next knot, in the lanes that are due."""
+    lanes = span.stride
+    for axis in range(3):
+        c, p = at.PATH + 6 * axis, at.PULLEY + axis
+        for j in range(span.begin, span.end):
+            due = row[at.DUE * lanes + j] > 0.0
+            new = quintic(
+                row[p * lanes + j],
+                row[(p + 3) * lanes + j],
+                row[(p + 6) * lanes + j],
+                row[(at.KNOT_PULLEY + axis) * lanes + j],
+                row[(at.KNOT_PULLEY + 3 + axis) * lanes + j],
+                row[(at.KNOT_PULLEY + 6 + axis) * lanes + j],
+                row[at.KNOT_SEGMENTS * lanes + j] * row[at.CONTROL_PERIOD * lanes + j],
+            )
+            for i in range(6):
+                row[(c + i) * lanes + j] = new[i] if due else row[(c + i) * lanes + j]
+
+
+@scalar
+def pose_knot(row: Block, components: int, records: npt.NDArray[np.float64], span: Span) -> None:
+    """Deck and pulley at the next knot, from the components (or the record)."""
+    sum_components(row, components, span)
     if records.shape[0] > 0:
-        read_record(row, records, lanes)
-    place_pulley(row, lanes)
+        read_record(row, records, span)
+    place_pulley(row, span)
+
+
+@scalar
+def start_motion(row: Block, components: int, records: npt.NDArray[np.float64], span: Span) -> None:
+    """Deck and pulley at the start, which is the first knot."""
+    lanes = span.stride
+    pose_knot(row, components, records, span)
+    for i in range(18):
+        for j in range(span.begin, span.end):
+            row[(at.KNOT_BEFORE + i) * lanes + j] = row[(at.KNOT + i) * lanes + j]
+    meet_knot(row, span)
+
+
+@scalar
+def meet_knot(row: Block, span: Span) -> None:
+    """Put the pulley where it is at the knot."""
+    lanes = span.stride
+    for i in range(9):
+        for j in range(span.begin, span.end):
+            row[(at.PULLEY + i) * lanes + j] = row[(at.KNOT_PULLEY + i) * lanes + j]
+
+
+@scalar
+def go_on(row: Block, components: int, records: npt.NDArray[np.float64], span: Span) -> None:
+    """Go on to the next knot in the lanes that are due, and lay the path there."""
+    lanes = span.stride
+    for i in range(18):
+        for j in range(span.begin, span.end):
+            before, knot = row[(at.KNOT_BEFORE + i) * lanes + j], row[(at.KNOT + i) * lanes + j]
+            row[(at.KNOT_BEFORE + i) * lanes + j] = knot if row[at.DUE * lanes + j] > 0.0 else before
+    pose_knot(row, components, records, span)
+    lay_path(row, span)
+
+
+@scalar
+def advance_motion(row: Block, components: int, records: npt.NDArray[np.float64], span: Span) -> None:
+    """Begin a motion segment: where a row has come to its knot, go on to the next.
+
+    Where many rows of a block are due all of them go through it, those that are not to the numbers that they have;
+    where few are, each goes alone.
+    """
+    lanes = span.stride
+    due = 0.0
+    for j in range(span.begin, span.end):
+        own = 1.0 if row[at.STEP * lanes + j] == row[at.KNOT_STEP * lanes + j] else 0.0
+        row[at.DUE * lanes + j] = own
+        row[at.KNOT_STEP * lanes + j] += own * row[at.KNOT_SEGMENTS * lanes + j]
+        due += own
+    if due > FEW:
+        go_on(row, components, records, span)
+    elif due > 0.0:
+        for j in range(span.begin, span.end):
+            if row[at.DUE * lanes + j] > 0.0:
+                go_on(row, components, records, Span(lanes, j, j + 1))
+    for j in range(span.begin, span.end):
+        since_knot = row[at.STEP * lanes + j] - row[at.KNOT_STEP * lanes + j] + row[at.KNOT_SEGMENTS * lanes + j]
+        row[at.ELAPSED * lanes + j] = since_knot * row[at.CONTROL_PERIOD * lanes + j]
+        row[at.STEP * lanes + j] += 1.0
+        row[at.TIME * lanes + j] = row[at.STEP * lanes + j] * row[at.CONTROL_PERIOD * lanes + j]
+
+
+@scalar
+def end_motion(row: Block, span: Span) -> None:
+    """Acceleration of the pulley at the end of a segment."""
+    lanes = span.stride
+    for axis in range(3):
+        c = at.PATH + 6 * axis
+        for j in range(span.begin, span.end):
+            row[(at.PULLEY + 6 + axis) * lanes + j] = bend(
+                row[(c + 2) * lanes + j],
+                row[(c + 3) * lanes + j],
+                row[(c + 4) * lanes + j],
+                row[(c + 5) * lanes + j],
+                row[at.ELAPSED * lanes + j] + row[at.CONTROL_PERIOD * lanes + j],
+            )
+
+
+@scalar
+def deck_coordinate(row: Block, dof: int, lanes: int, j: int) -> float:
+    """Coordinate ``dof`` of lane j's deck at the row's time."""
+    period, segments = row[at.CONTROL_PERIOD * lanes + j], row[at.KNOT_SEGMENTS * lanes + j]
+    elapsed = (row[at.STEP * lanes + j] - row[at.KNOT_STEP * lanes + j] + segments) * period
+    c = quintic(
+        row[(at.KNOT_BEFORE + dof) * lanes + j],
+        row[(at.KNOT_BEFORE + 6 + dof) * lanes + j],
+        row[(at.KNOT_BEFORE + 12 + dof) * lanes + j],
+        row[(at.KNOT + dof) * lanes + j],
+        row[(at.KNOT + 6 + dof) * lanes + j],
+        row[(at.KNOT + 12 + dof) * lanes + j],
+        segments * period,
+    )
+    return on_quintic(*c, elapsed)[0]

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from aframe_env.dynamics.compiling import scalar
+from aframe_env.dynamics.compiling import fma, scalar
 
 
 @scalar
-def tension(elongation: float, elongation_rate: float, length: float, axial_stiffness: float, damping: float) -> float:
-    """Rope tension max(0, c_R Δ + d_R Δ'), N, with c_R = E_R F_R / l.
+def tension(elongation: float, elongation_rate: float, stiffness: float, damping: float) -> float:
+    """Rope tension max(0, c_R Δ + d_R Δ'), N.
 
-    ``length`` is the unstretched length l [m] between drum and load, ``elongation`` is Δ [m], ``damping`` is
-    d_R [N s/m]. A rope never pushes, not even a damped one.
+    ``elongation`` is Δ [m], ``stiffness`` c_R = E_R F_R / l [N/m] with l the unstretched length between drum and
+    load, ``damping`` d_R [N s/m]. A rope never pushes, not even a damped one.
     """
-    force = axial_stiffness / length * elongation + damping * elongation_rate
+    force = fma(stiffness, elongation, damping * elongation_rate)
     return force if force > 0.0 else 0.0

@@ -11,26 +11,27 @@ import numpy.typing as npt
 from numba import prange
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar, source_digest
-from aframe_env.dynamics.integrator import rk4_step
-from aframe_env.dynamics.layout import LANES
-from aframe_env.dynamics.motion import advance_motion, on_quintic, pose_deck
-from aframe_env.dynamics.rope import tension
+from aframe_env.dynamics.compiling import fma, kernel, parallel_kernel, scalar, source_digest
+from aframe_env.dynamics.integrator import RopeEnd, rk4_step
+from aframe_env.dynamics.layout import LANES, Span
+from aframe_env.dynamics.motion import advance_motion, deck_coordinate, end_motion, on_path, start_motion
+from aframe_env.dynamics.simplified import load_acceleration
 from aframe_env.dynamics.winch import drum_state, next_error, plan
 
 Array = npt.NDArray[np.float64]
 
 
 @scalar
-def plan_winch(row: Array, lanes: int) -> None:
+def plan_winch(row: Array, span: Span) -> None:
     """Limit the command and plan how the drum follows it over the segment."""
-    for j in range(lanes):
+    lanes = span.stride
+    for j in range(span.begin, span.end):
         limit = row[at.MAX_SPEED * lanes + j]
         command = row[at.COMMAND * lanes + j]
         command = limit if command > limit else command
         command = -limit if command < -limit else command
         row[at.COMMAND * lanes + j] = command
-        half_step = 0.5 * row[at.CONTROL_PERIOD * lanes + j] / row[at.SUBSTEPS * lanes + j]
+        half_step = 0.5 * row[at.INNER_STEP * lanes + j]
         direction, ramp_time, error, first, error_there = plan(
             command,
             row[at.DRUM_SPEED * lanes + j],
@@ -67,172 +68,164 @@ def drum_at(row: Array, lanes: int, j: int, elapsed: float, error: float) -> tup
 
 
 @scalar
-def pulley_at(row: Array, lanes: int, j: int, elapsed: float) -> tuple[float, float, float, float, float, float]:
-    """Pulley position and velocity of lane j, ``elapsed`` s into the segment."""
-    c = at.PATH
-    s1, d1 = on_quintic(
-        row[c * lanes + j],
-        row[(c + 1) * lanes + j],
-        row[(c + 2) * lanes + j],
-        row[(c + 3) * lanes + j],
-        row[(c + 4) * lanes + j],
-        row[(c + 5) * lanes + j],
-        elapsed,
-    )
-    s2, d2 = on_quintic(
-        row[(c + 6) * lanes + j],
-        row[(c + 7) * lanes + j],
-        row[(c + 8) * lanes + j],
-        row[(c + 9) * lanes + j],
-        row[(c + 10) * lanes + j],
-        row[(c + 11) * lanes + j],
-        elapsed,
-    )
-    s3, d3 = on_quintic(
-        row[(c + 12) * lanes + j],
-        row[(c + 13) * lanes + j],
-        row[(c + 14) * lanes + j],
-        row[(c + 15) * lanes + j],
-        row[(c + 16) * lanes + j],
-        row[(c + 17) * lanes + j],
-        elapsed,
-    )
-    return s1, s2, s3, d1, d2, d3
+def rope_end(row: Array, lanes: int, j: int, elapsed: float, error: float) -> tuple[RopeEnd, float, float]:
+    """Upper end of lane j's rope ``elapsed`` s into the segment, and the drum's angle and speed."""
+    angle, speed = drum_at(row, lanes, j, elapsed, error)
+    t = row[at.ELAPSED * lanes + j] + elapsed
+    s1, d1 = on_path(row, 0, t, lanes, j)
+    s2, d2 = on_path(row, 1, t, lanes, j)
+    s3, d3 = on_path(row, 2, t, lanes, j)
+    radius = row[at.DRUM_RADIUS * lanes + j]
+    length = fma(radius, angle, row[at.FREE_LENGTH * lanes + j])
+    stiffness = row[at.AXIAL_STIFFNESS * lanes + j] / length
+    return (s1, s2, s3, d1, d2, d3, length, radius * speed, stiffness), angle, speed
 
 
 @scalar
-def inner_step(row: Array, index: int, lanes: int) -> None:
+def inner_step(row: Array, index: int, span: Span) -> None:
     """Inner step number ``index`` of the segment, for every lane that has so many (the others stand still)."""
-    for j in range(lanes):
+    lanes = span.stride
+    for j in range(span.begin, span.end):
         active = index < row[at.SUBSTEPS * lanes + j]
-        full = row[at.CONTROL_PERIOD * lanes + j] / row[at.SUBSTEPS * lanes + j]
+        full = row[at.INNER_STEP * lanes + j]
         begin = index * full
-        h = full if active else 0.0
         error0 = row[(at.WINCH + 4) * lanes + j]
         first, decay = row[(at.WINCH + 3) * lanes + j], row[at.HALF_STEP_DECAY * lanes + j]
         error1 = next_error(error0, 2.0 * index + 1.0, first, decay)
         error2 = next_error(error1, 2.0 * index + 2.0, first, decay)
-        free_length, radius = row[at.FREE_LENGTH * lanes + j], row[at.DRUM_RADIUS * lanes + j]
-        angle0, speed0 = row[at.DRUM_ANGLE * lanes + j], row[at.DRUM_SPEED * lanes + j]
-        angle1, speed1 = drum_at(row, lanes, j, begin + 0.5 * full, error1)
-        angle2, speed2 = drum_at(row, lanes, j, begin + full, error2)
-        t1, t2, t3 = row[at.TIP * lanes + j], row[(at.TIP + 1) * lanes + j], row[(at.TIP + 2) * lanes + j]
-        t4, t5, t6 = (
-            row[(at.TIP + 3) * lanes + j],
-            row[(at.TIP + 4) * lanes + j],
-            row[(at.TIP + 5) * lanes + j],
+        radius, angle0, speed0 = (
+            row[at.DRUM_RADIUS * lanes + j],
+            row[at.DRUM_ANGLE * lanes + j],
+            row[at.DRUM_SPEED * lanes + j],
         )
-        start = (t1, t2, t3, t4, t5, t6, free_length + radius * angle0, radius * speed0)
-        m1, m2, m3, m4, m5, m6 = pulley_at(row, lanes, j, begin + 0.5 * full)
-        middle = (m1, m2, m3, m4, m5, m6, free_length + radius * angle1, radius * speed1)
-        e1, e2, e3, e4, e5, e6 = pulley_at(row, lanes, j, begin + full)
-        end = (e1, e2, e3, e4, e5, e6, free_length + radius * angle2, radius * speed2)
-        parted = row[at.PARTED * lanes + j]
-        stiffness = row[at.AXIAL_STIFFNESS * lanes + j] * (1.0 - parted)
-        damping = row[at.ROPE_DAMPING * lanes + j] * (1.0 - parted)
-        x1, x2, x3, v1, v2, v3, cost, peak = rk4_step(
+        t1, t2, t3 = row[at.PULLEY * lanes + j], row[(at.PULLEY + 1) * lanes + j], row[(at.PULLEY + 2) * lanes + j]
+        t4, t5, t6 = (
+            row[(at.PULLEY + 3) * lanes + j],
+            row[(at.PULLEY + 4) * lanes + j],
+            row[(at.PULLEY + 5) * lanes + j],
+        )
+        length0 = fma(radius, angle0, row[at.FREE_LENGTH * lanes + j])
+        start = (t1, t2, t3, t4, t5, t6, length0, radius * speed0, row[at.AXIAL_STIFFNESS * lanes + j] / length0)
+        middle, _, _ = rope_end(row, lanes, j, begin + 0.5 * full, error1)
+        end, angle2, speed2 = rope_end(row, lanes, j, begin + full, error2)
+        x1, x2, x3 = (
             row[at.LOAD_POSITION * lanes + j],
             row[(at.LOAD_POSITION + 1) * lanes + j],
             row[(at.LOAD_POSITION + 2) * lanes + j],
+        )
+        v1, v2, v3 = (
             row[at.LOAD_VELOCITY * lanes + j],
             row[(at.LOAD_VELOCITY + 1) * lanes + j],
             row[(at.LOAD_VELOCITY + 2) * lanes + j],
-            start,
-            middle,
-            end,
-            h,
-            row[at.TARGET * lanes + j],
+        )
+        parted, target = row[at.PARTED * lanes + j], row[at.TARGET * lanes + j]
+        intact = 1.0 - parted
+        x1, x2, x3, v1, v2, v3, cost, peak = rk4_step(
+            x1,
+            x2,
+            x3,
+            v1,
+            v2,
+            v3,
+            (*start[:8], intact * start[8]),
+            (*middle[:8], intact * middle[8]),
+            (*end[:8], intact * end[8]),
+            full if active else 0.0,
+            target,
             row[at.DRUM_TO_PULLEY * lanes + j],
-            stiffness,
-            damping,
+            intact * row[at.ROPE_DAMPING * lanes + j],
             row[at.MASS * lanes + j],
             row[at.GRAVITY * lanes + j],
         )
-        (
-            row[at.LOAD_POSITION * lanes + j],
-            row[(at.LOAD_POSITION + 1) * lanes + j],
-            row[(at.LOAD_POSITION + 2) * lanes + j],
-        ) = x1, x2, x3
-        (
-            row[at.LOAD_VELOCITY * lanes + j],
-            row[(at.LOAD_VELOCITY + 1) * lanes + j],
-            row[(at.LOAD_VELOCITY + 2) * lanes + j],
-        ) = v1, v2, v3
+        row[at.LOAD_POSITION * lanes + j] = x1
+        row[(at.LOAD_POSITION + 1) * lanes + j] = x2
+        row[(at.LOAD_POSITION + 2) * lanes + j] = x3
+        row[at.LOAD_VELOCITY * lanes + j] = v1
+        row[(at.LOAD_VELOCITY + 1) * lanes + j] = v2
+        row[(at.LOAD_VELOCITY + 2) * lanes + j] = v3
         row[at.STEP_COST * lanes + j] += cost
-        deviation = abs(x3 - row[at.TARGET * lanes + j])
-        row[at.OMEGA2 * lanes + j] = deviation if deviation > row[at.OMEGA2 * lanes + j] else row[at.OMEGA2 * lanes + j]
+        deviation, worst = abs(x3 - target), row[at.OMEGA2 * lanes + j]
+        row[at.OMEGA2 * lanes + j] = deviation if deviation > worst else worst
         row[(at.WINCH + 4) * lanes + j] = error2 if active else error0
         row[at.DRUM_ANGLE * lanes + j] = angle2 if active else angle0
         row[at.DRUM_SPEED * lanes + j] = speed2 if active else speed0
-        row[at.TIP * lanes + j] = e1 if active else t1
-        row[(at.TIP + 1) * lanes + j] = e2 if active else t2
-        row[(at.TIP + 2) * lanes + j] = e3 if active else t3
-        row[(at.TIP + 3) * lanes + j] = e4 if active else t4
-        row[(at.TIP + 4) * lanes + j] = e5 if active else t5
-        row[(at.TIP + 5) * lanes + j] = e6 if active else t6
+        row[at.PULLEY * lanes + j] = end[0] if active else t1
+        row[(at.PULLEY + 1) * lanes + j] = end[1] if active else t2
+        row[(at.PULLEY + 2) * lanes + j] = end[2] if active else t3
+        row[(at.PULLEY + 3) * lanes + j] = end[3] if active else t4
+        row[(at.PULLEY + 4) * lanes + j] = end[4] if active else t5
+        row[(at.PULLEY + 5) * lanes + j] = end[5] if active else t6
         # A lane that stands still has met its pulley and drum beyond the segment: what it felt there is no tension.
         row[at.SLACK * lanes + j] = 1.0 if active and peak <= 0.0 else row[at.SLACK * lanes + j]
         peak = peak if active else 0.0
-        row[at.PEAK_TENSION * lanes + j] = (
-            peak if peak > row[at.PEAK_TENSION * lanes + j] else row[at.PEAK_TENSION * lanes + j]
-        )
+        most = row[at.PEAK_TENSION * lanes + j]
+        row[at.PEAK_TENSION * lanes + j] = peak if peak > most else most
         row[at.PARTED * lanes + j] = 1.0 if peak > row[at.BREAKING_LOAD * lanes + j] else parted
 
 
 @scalar
-def measure_tension(row: Array, lanes: int) -> None:
+def measure_tension(row: Array, span: Span) -> None:
     """Rope tension at the row's present state, and whether the rope is slack."""
-    for j in range(lanes):
-        u1 = row[at.PULLEY * lanes + j] - row[at.LOAD_POSITION * lanes + j]
-        u2 = row[(at.PULLEY + 1) * lanes + j] - row[(at.LOAD_POSITION + 1) * lanes + j]
-        u3 = row[(at.PULLEY + 2) * lanes + j] - row[(at.LOAD_POSITION + 2) * lanes + j]
-        w1 = row[(at.PULLEY + 3) * lanes + j] - row[at.LOAD_VELOCITY * lanes + j]
-        w2 = row[(at.PULLEY + 4) * lanes + j] - row[(at.LOAD_VELOCITY + 1) * lanes + j]
-        w3 = row[(at.PULLEY + 5) * lanes + j] - row[(at.LOAD_VELOCITY + 2) * lanes + j]
-        distance = np.sqrt(u1 * u1 + u2 * u2 + u3 * u3 + 1e-18)
-        length = row[at.FREE_LENGTH * lanes + j] + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
-        rate = (u1 * w1 + u2 * w2 + u3 * w3) / distance - row[at.DRUM_RADIUS * lanes + j] * row[
-            at.DRUM_SPEED * lanes + j
-        ]
+    lanes = span.stride
+    for j in range(span.begin, span.end):
+        radius = row[at.DRUM_RADIUS * lanes + j]
+        length = fma(radius, row[at.DRUM_ANGLE * lanes + j], row[at.FREE_LENGTH * lanes + j])
         intact = 1.0 - row[at.PARTED * lanes + j]
-        force = intact * tension(
-            distance + row[at.DRUM_TO_PULLEY * lanes + j] - length,
-            rate,
+        _, _, _, force = load_acceleration(
+            row[at.LOAD_POSITION * lanes + j],
+            row[(at.LOAD_POSITION + 1) * lanes + j],
+            row[(at.LOAD_POSITION + 2) * lanes + j],
+            row[at.LOAD_VELOCITY * lanes + j],
+            row[(at.LOAD_VELOCITY + 1) * lanes + j],
+            row[(at.LOAD_VELOCITY + 2) * lanes + j],
+            row[at.PULLEY * lanes + j],
+            row[(at.PULLEY + 1) * lanes + j],
+            row[(at.PULLEY + 2) * lanes + j],
+            row[(at.PULLEY + 3) * lanes + j],
+            row[(at.PULLEY + 4) * lanes + j],
+            row[(at.PULLEY + 5) * lanes + j],
             length,
-            row[at.AXIAL_STIFFNESS * lanes + j],
-            row[at.ROPE_DAMPING * lanes + j],
+            radius * row[at.DRUM_SPEED * lanes + j],
+            intact * row[at.AXIAL_STIFFNESS * lanes + j] / length,
+            row[at.DRUM_TO_PULLEY * lanes + j],
+            intact * row[at.ROPE_DAMPING * lanes + j],
+            1.0,
+            0.0,
         )
         row[at.TENSION * lanes + j] = force
         row[at.SLACK * lanes + j] = 1.0 if force <= 0.0 else row[at.SLACK * lanes + j]
 
 
 @scalar
-def control_step(row: Array, components: int, segments: int, records: Array, lanes: int) -> None:
+def control_step(row: Array, components: int, segments: int, records: Array, span: Span) -> None:
     """Advance a block by one control step of ``segments`` motion segments, the command held."""
+    lanes = span.stride
     most = 0.0
-    for j in range(lanes):
+    for j in range(span.begin, span.end):
         row[at.STEP_COST * lanes + j] = 0.0
         row[at.PEAK_TENSION * lanes + j] = 0.0
         row[at.SLACK * lanes + j] = 0.0
         most = row[at.SUBSTEPS * lanes + j] if row[at.SUBSTEPS * lanes + j] > most else most
     for _ in range(segments):
-        advance_motion(row, components, records, lanes)
-        plan_winch(row, lanes)
+        advance_motion(row, components, records, span)
+        plan_winch(row, span)
         for index in range(int(most)):
-            inner_step(row, index, lanes)
-    measure_tension(row, lanes)
-    for j in range(lanes):
+            inner_step(row, index, span)
+        end_motion(row, span)
+    measure_tension(row, span)
+    for j in range(span.begin, span.end):
         row[at.OMEGA1 * lanes + j] += row[at.STEP_COST * lanes + j]
 
 
 @scalar
-def start_rows(row: Array, components: int, records: Array, lanes: int) -> None:
+def start_rows(row: Array, components: int, records: Array, span: Span) -> None:
     """Deck, pulley and rope tension at the row's time, before the first step."""
-    for j in range(lanes):
+    lanes = span.stride
+    for j in range(span.begin, span.end):
         row[at.SLACK * lanes + j] = 0.0
-    pose_deck(row, components, records, lanes)
-    measure_tension(row, lanes)
-    for j in range(lanes):
+    start_motion(row, components, records, span)
+    measure_tension(row, span)
+    for j in range(span.begin, span.end):
         row[at.PEAK_TENSION * lanes + j] = row[at.TENSION * lanes + j]
 
 
@@ -244,30 +237,40 @@ class StepKernels(NamedTuple):
     step_parallel: Callable[[Array, int, int, Array], None]
     """The same, blocks spread over the cores."""
     start: Callable[[Array, int, Array], None]
-    """(blocks, components, records): pose the deck and measure the rope at the rows' times."""
+    """(blocks, components, records): pose the deck and measure the rope at the rows' start."""
+    deck: Callable[[Array, Array], None]
+    """(blocks, coordinates (N, 6)): read out surge, sway, heave, roll, pitch and yaw of the first N rows."""
 
 
 @cache
 def step_kernels(lanes: int = LANES) -> StepKernels:
     """Kernels for blocks of ``lanes`` rows (LANES for a batch, 1 for a single row)."""
     source: Any = source_digest()
+    span = Span(lanes, 0, lanes)
 
     @kernel
     def step(blocks: Array, components: int, segments: int, records: Array) -> None:
         source  # noqa: B018  (a changed digest makes a new cache entry)
         for block in range(blocks.shape[0]):
-            control_step(blocks[block], components, segments, records, lanes)
+            control_step(blocks[block], components, segments, records, span)
 
     @parallel_kernel
     def step_parallel(blocks: Array, components: int, segments: int, records: Array) -> None:
         source  # noqa: B018
         for block in prange(blocks.shape[0]):
-            control_step(blocks[block], components, segments, records, lanes)
+            control_step(blocks[block], components, segments, records, span)
 
     @kernel
     def start(blocks: Array, components: int, records: Array) -> None:
         source  # noqa: B018
         for block in range(blocks.shape[0]):
-            start_rows(blocks[block], components, records, lanes)
+            start_rows(blocks[block], components, records, span)
 
-    return StepKernels(step, step_parallel, start)
+    @kernel
+    def deck(blocks: Array, coordinates: Array) -> None:
+        source  # noqa: B018
+        for i in range(coordinates.shape[0]):
+            for dof in range(6):
+                coordinates[i, dof] = deck_coordinate(blocks[i // lanes], dof, lanes, i % lanes)
+
+    return StepKernels(step, step_parallel, start, deck)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from aframe_env.dynamics.compiling import scalar
+from aframe_env.dynamics.compiling import fma, scalar
 
 
 @scalar
@@ -60,10 +60,11 @@ def drum_state(
     ramping = elapsed < ramp_time
     ramp = elapsed if ramping else ramp_time
     rest = elapsed - ramp
-    after_ramp = angle + ramp * (speed + 0.5 * direction * max_acceleration * ramp)
-    settled = after_ramp + command * rest - direction * lag * (error_after_ramp - error)
+    acceleration = direction * max_acceleration
+    after_ramp = fma(ramp, fma(0.5 * acceleration, ramp, speed), angle)
+    settled = fma(command, rest, after_ramp) - direction * lag * (error_after_ramp - error)
     new_angle = after_ramp if ramping else settled
-    new_speed = speed + direction * max_acceleration * ramp if ramping else command - direction * error
+    new_speed = fma(acceleration, ramp, speed) if ramping else fma(-direction, error, command)
     low = new_angle <= min_angle
     high = new_angle >= max_angle
     new_speed = 0.0 if (low and new_speed < 0.0) or (high and new_speed > 0.0) else new_speed

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from aframe_env import task
 from aframe_env.crane import Crane
 from aframe_env.dynamics import layout as at
-from aframe_env.motion import HarmonicMotion, ShipMotion, TabledMotion
+from aframe_env.motion import HarmonicMotion, ShipMotion, is_tabled
 from aframe_env.rendering.water import Water, water_of
 from aframe_env.sea import SeaMotion
 from aframe_env.simulation import Simulation
@@ -76,7 +76,7 @@ def scene_of(simulation: Simulation, row: int) -> Scene:
     if scenario is None:
         raise gymnasium.error.ResetNeeded("render() before the first reset()")
     engine, state, results = simulation.engine, simulation.state[row], simulation.results[row]
-    coordinates = engine.read_many(at.MOTION, 6)[row]
+    coordinates = engine.deck()[row]
     return Scene(
         time=float(results[task.TIME]),
         motion=motion_in_words(scenario.motion),
@@ -119,4 +119,4 @@ def motion_in_words(motion: ShipMotion) -> str:
         return f"Hs {sea.hs:.1f} m    Tp {sea.tp:.1f} s    heading {heading:.0f}°"
     if isinstance(motion, HarmonicMotion):
         return "harmonic motion" if motion.harmonics else "ship at rest"
-    return "recorded motion" if isinstance(motion, TabledMotion) else "ship motion"
+    return "recorded motion" if is_tabled(motion) else "ship motion"

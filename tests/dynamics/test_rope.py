@@ -19,7 +19,7 @@ from aframe_env.dynamics.rope import tension
 def test_a_rope_pulls_and_never_pushes(
     elongation: float, rate: float, length: float, stiffness: float, damping: float
 ) -> None:
-    force = tension(elongation, rate, length, stiffness, damping)
+    force = tension(elongation, rate, stiffness / length, damping)
     linear = stiffness * elongation / length + damping * rate
     assert force >= 0.0
     if linear > 0:
@@ -29,6 +29,6 @@ def test_a_rope_pulls_and_never_pushes(
 
 
 def test_slack_and_shortening() -> None:
-    assert tension(-1e-6, 0.0, 300.0, 2e8, 1e4) == 0.0
-    assert tension(0.1, -100.0, 300.0, 2e8, 1e4) == 0.0
-    assert tension(1.5, 0.0, 300.0, 2e8, 0.0) == 1e6
+    assert tension(-1e-6, 0.0, 2e8 / 300.0, 1e4) == 0.0
+    assert tension(0.1, -100.0, 2e8 / 300.0, 1e4) == 0.0
+    assert tension(1.5, 0.0, 2e8 / 300.0, 0.0) == 1e6

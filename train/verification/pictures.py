@@ -195,7 +195,7 @@ def figure_14() -> Figure:
     top.plot(time, rigid["xL3_m"], color="0.5", linewidth=2.2, label="simplified model (reference run)")
     top.plot(time, here["xL3_m"], color=HERE, linewidth=1.0, label="full model, rfem 20/16")
     top.set_ylabel("x_L3, m")
-    top.legend(fontsize=8, loc="upper right")
+    top.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     bottom.plot(
         time,
         (there["xL3_m"] - rigid["xL3_m"]) * 1e3,

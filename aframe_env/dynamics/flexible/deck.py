@@ -8,34 +8,27 @@ import numpy.typing as npt
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.compiling import scalar
 from aframe_env.dynamics.flexible import layout as flex
-from aframe_env.dynamics.motion import advance_motion, on_quintic, quintic
+from aframe_env.dynamics.layout import Span
+from aframe_env.dynamics.motion import advance_motion, bend, meet_knot, on_quintic, quintic
 from aframe_env.dynamics.transforms import turn
 
 Block = npt.NDArray[np.float64]
 
 
 @scalar
-def bend(c2: float, c3: float, c4: float, c5: float, t: float) -> float:
-    """Second derivative of a quintic."""
-    return 2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5))
-
-
-@scalar
 def advance_deck(row: Block, frame: Block, components: int, records: Block, lanes: int) -> None:
-    """Advance the deck by one segment, and lay quintics through its six coordinates over it."""
-    for i in range(18):
-        for j in range(lanes):
-            frame[(flex.BEFORE + i) * lanes + j] = row[(at.MOTION + i) * lanes + j]
-    advance_motion(row, components, records, lanes)
+    """Advance the deck by one segment, which ends at a knot, and lay quintics through its six coordinates over it."""
+    advance_motion(row, components, records, Span(lanes, 0, lanes))
+    meet_knot(row, Span(lanes, 0, lanes))
     for dof in range(6):
         for j in range(lanes):
             coefficients = quintic(
-                frame[(flex.BEFORE + dof) * lanes + j],
-                frame[(flex.BEFORE + 6 + dof) * lanes + j],
-                frame[(flex.BEFORE + 12 + dof) * lanes + j],
-                row[(at.MOTION + dof) * lanes + j],
-                row[(at.MOTION + 6 + dof) * lanes + j],
-                row[(at.MOTION + 12 + dof) * lanes + j],
+                row[(at.KNOT_BEFORE + dof) * lanes + j],
+                row[(at.KNOT_BEFORE + 6 + dof) * lanes + j],
+                row[(at.KNOT_BEFORE + 12 + dof) * lanes + j],
+                row[(at.KNOT + dof) * lanes + j],
+                row[(at.KNOT + 6 + dof) * lanes + j],
+                row[(at.KNOT + 12 + dof) * lanes + j],
                 row[at.CONTROL_PERIOD * lanes + j],
             )
             for k in range(6):
@@ -119,7 +112,7 @@ def deck_at(row: Block, frame: Block, index: int, lanes: int) -> None:
 def deck_now(row: Block, frame: Block, lanes: int) -> None:
     """Pose from the deck's coordinates as they are in the row."""
     for j in range(lanes):
-        m = at.MOTION
+        m = at.KNOT
         write_pose(
             row,
             frame,

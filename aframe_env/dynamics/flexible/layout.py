@@ -35,9 +35,7 @@ CARRIED: Final = 76
 CARRIED_MOST: Final = 8
 TIP: Final = CARRIED + 9 * CARRIED_MOST
 """Displacement of S and its rate at the end of the step but for the coming pull of the rope, 6."""
-BEFORE: Final = TIP + 6
-"""Deck's coordinates, rates and accelerations at the segment's start, 18."""
-ACTIVE: Final = BEFORE + 18
+ACTIVE: Final = TIP + 6
 """1 where the row takes part in the inner step that is under way."""
 MODES: Final = ACTIVE + 1
 """MODE_SLOTS for each mode from here on."""

@@ -1,4 +1,4 @@
-"""What a frame's present state means: deflection of S, reactions, servomotor forces, utilisation of its material.
+"""What a frame's present state means: deflection of S, reactions, servomotor forces, utilisation, largest rotation.
 
 Reactions are R = Pᵀ(K q + L q̇ - f), linear in the modes and in what acts on the frame, see
 ``aframe_env.dynamics.rfem.constraints``.
@@ -6,6 +6,7 @@ Reactions are R = Pᵀ(K q + L q̇ - f), linear in the modes and in what acts on
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cache, lru_cache
 from typing import Any, Final
@@ -20,7 +21,7 @@ from aframe_env.dynamics.flexible import layout as flex
 from aframe_env.dynamics.flexible.blocks import nine
 from aframe_env.dynamics.flexible.reduction import ModalFrame, modal_frame
 from aframe_env.dynamics.rfem.chain import Division
-from aframe_env.dynamics.rfem.model import FrameModel
+from aframe_env.dynamics.rfem.model import SMALL_ROTATION, FrameModel
 
 Array = npt.NDArray[np.float64]
 
@@ -33,10 +34,12 @@ SERVOMOTORS: Final = 9
 """Tensions of S_R and S_L, 2, N."""
 UTILISATION: Final = 11
 """Largest von Mises stress at an sde over the yield strength; NaN for sections without stress points."""
-READOUTS: Final = 12
+ROTATION: Final = 12
+"""Largest rotation of an rfe, rad; 0 where a bound on it is within SMALL_ROTATION."""
+READOUTS: Final = 13
 
 # Head of a line of the readout's table.
-COUNT, CARRIED_COUNT, SPRINGS, POINTS, DAMPED, HEAD = 0, 1, 2, 3, 4, 5
+COUNT, CARRIED_COUNT, SPRINGS, POINTS, DAMPED, BODIES, HEAD = 0, 1, 2, 3, 4, 5, 6
 FORCES: Final = 11
 """Numbers that are linear in the state: columns up to UTILISATION."""
 
@@ -87,7 +90,9 @@ def readout_table(frame: Frame, division: Division, modes: int | None) -> Array:
     strain = (model.deformation @ shape).T
     points = _points(modal)
     damping = model.structure.damping()
-    head = [modal.count, modal.carried_count, points.shape[0], points.shape[1], bool(damping.any())]
+    turned = shape.T.reshape(modal.count, -1, 6)[:, :, 3:]
+    reach = np.linalg.norm(turned, axis=2).max(axis=1)
+    head = [modal.count, modal.carried_count, *points.shape[:2], bool(damping.any()), turned.shape[1]]
     parts = [
         by_position,
         by_rate,
@@ -97,6 +102,8 @@ def readout_table(frame: Frame, division: Division, modes: int | None) -> Array:
         strain * model.structure.stiffness(),
         strain * damping,
         points,
+        reach,
+        turned,
     ]
     return np.concatenate([np.array(head, dtype=np.float64), *(part.ravel() for part in parts)])
 
@@ -115,14 +122,17 @@ def read_frame(frame: Array, table: Array, stresses: Array, result: Array, lanes
     modes, carried, springs = int(table[COUNT]), int(table[CARRIED_COUNT]), int(table[SPRINGS])
     points = int(table[POINTS])
     forces = result[:FORCES]
+    bound = 0.0
     result[:] = 0.0
     stresses[:] = 0.0
     acting = HEAD + 2 * FORCES * modes
     strains = acting + FORCES * (12 + 9 * carried + 3)
     shares = strains + 12 * springs * modes
+    reach = shares + 6 * springs * points
     for i in range(modes):
         mode = (flex.MODES + flex.MODE_SLOTS * i) * lanes + j
         place, rate = frame[mode + flex.POSITION * lanes], frame[mode + flex.RATE * lanes]
+        bound += abs(place) * table[reach + i]
         add_line(forces, table, HEAD + FORCES * i, FORCES, place)
         add_line(forces, table, HEAD + FORCES * (modes + i), FORCES, rate)
         add_line(stresses, table, strains + 6 * springs * i, 6 * springs, place)
@@ -152,6 +162,23 @@ def read_frame(frame: Array, table: Array, stresses: Array, result: Array, lanes
             square = sigma * sigma + 3.0 * tau * tau
             worst = square if square > worst or square != square else worst  # once NaN, always NaN
     result[UTILISATION] = np.sqrt(worst)
+    if bound > SMALL_ROTATION:
+        result[ROTATION] = largest_rotation(frame, table, reach + modes, lanes, j)
+
+
+@scalar
+def largest_rotation(frame: Array, table: Array, first: int, lanes: int, j: int) -> float:
+    """Largest rotation of an rfe, rad, by the modes' rotations in the table from ``first``."""
+    modes, bodies = int(table[COUNT]), int(table[BODIES])
+    largest = 0.0
+    for body in range(bodies):
+        x, y, z = 0.0, 0.0, 0.0
+        for i in range(modes):
+            place = frame[(flex.MODES + flex.MODE_SLOTS * i + flex.POSITION) * lanes + j]
+            k = first + 3 * (bodies * i + body)
+            x, y, z = x + table[k] * place, y + table[k + 1] * place, z + table[k + 2] * place
+        largest = max(largest, x * x + y * y + z * z)
+    return math.sqrt(largest)
 
 
 @cache

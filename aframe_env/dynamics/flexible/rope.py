@@ -82,13 +82,13 @@ def sweep(
     compliance = load_give + a1 * g1 + a2 * g2 + a3 * g3
     compliance_rate = load_give_rate + a1 * r1 + a2 * r2 + a3 * r3
     # As if the rope had given way by what this force explains: the tension then solves the law.
-    softened = 1.0 + axial_stiffness / length * compliance + damping * compliance_rate
+    stiffness = axial_stiffness / length
+    softened = 1.0 + stiffness * compliance + damping * compliance_rate
     new_force = (
         tension(
             stretch + compliance * force,
             rate - pay_out_speed + compliance_rate * force,
-            length,
-            axial_stiffness,
+            stiffness,
             damping,
         )
         / softened

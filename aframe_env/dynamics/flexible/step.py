@@ -18,7 +18,7 @@ from aframe_env.dynamics.flexible.deck import advance_deck, deck_at
 from aframe_env.dynamics.flexible.frame import finish, predict
 from aframe_env.dynamics.flexible.rope import apply, apply_transposed, sweep, unit
 from aframe_env.dynamics.flexible.start import start_rows
-from aframe_env.dynamics.layout import LANES
+from aframe_env.dynamics.layout import LANES, Span
 from aframe_env.dynamics.step import drum_at, plan_winch
 from aframe_env.dynamics.winch import next_error
 
@@ -134,7 +134,7 @@ def control_step(
         most = row[at.SUBSTEPS * lanes + j] if row[at.SUBSTEPS * lanes + j] > most else most
     for _ in range(segments):
         advance_deck(row, frame, components, records, lanes)
-        plan_winch(row, lanes)
+        plan_winch(row, Span(lanes, 0, lanes))
         for index in range(int(most)):
             deck_at(row, frame, index, lanes)
             for line in range(tables.shape[0]):

@@ -6,6 +6,11 @@ lengths of rigid servomotors cannot drift, whatever the integrator and the durat
 block for each group of rfes that constraints touch) and M-orthonormal, ZᵀMZ = 1; P = M⁻¹Cᵀ(CM⁻¹Cᵀ)⁻¹ is
 M-orthogonal to Z, so that the reactions follow from positions and velocities alone: R = Pᵀ(K q + L q̇ − f) +
 (CM⁻¹Cᵀ)⁻¹ b̈.
+
+The length of a servomotor is the one of the linear frame, |NC| + e·u_N with the unit vector e of C–N undeformed: like
+K_F and the rotations of (10) it leaves out what is of second order in the displacements. The displaced points are some
+|u_N|²/(2 |NC|) further apart, a sideways displacement above all. To hold that distance instead would not make the frame
+more exact: the legs' chords A–N lengthen in the same way, and forces keep their undeformed directions.
 """
 
 from __future__ import annotations

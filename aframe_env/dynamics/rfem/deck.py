@@ -9,7 +9,7 @@ import numpy as np
 from aframe_env.dynamics.motion import smooth_ramp
 from aframe_env.dynamics.rfem.beam import Array
 from aframe_env.dynamics.transforms import turn
-from aframe_env.motion import ComponentMotion, require_coverage
+from aframe_env.motion import has_components, require_coverage
 from aframe_env.scenario import Scenario
 
 
@@ -47,7 +47,7 @@ def deck_coordinates(scenario: Scenario, step: float, count: int) -> Array:
         InvalidValue: The motion is a record that is too short.
     """
     times = step * np.arange(count, dtype=np.float64)
-    if isinstance(scenario.motion, ComponentMotion):
+    if has_components(scenario.motion):
         motion = scenario.motion.components().at(times)
     else:
         require_coverage(scenario.motion, "duration", float(times[-1]))

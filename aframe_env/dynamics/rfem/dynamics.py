@@ -63,7 +63,8 @@ class DynamicCase:
     """One dynamic run."""
 
     scenario: Scenario = field(default_factory=Scenario.paper)
-    """Crane, ship motion, load and rope; the load starts from static equilibrium. The luffing angle stays as it is."""
+    """Crane, ship motion, load and rope; the load starts from static equilibrium. The luffing angle stays as it is, but
+    for the small rotations that ``strokes`` make."""
     drum: Drum = field(default_factory=StillDrum)
     """What the drum does."""
     strokes: tuple[Stroke, Stroke] | None = None
@@ -184,7 +185,6 @@ class _Run:
             before, deflection = deflection, level @ model.pulley @ position
             if np.max(np.abs(deflection - before)) < 1e-13:
                 break
-        model.warn_of_rotation(position)
         stretched = self.unstretched * (1.0 + tension / self.crane.rope.axial_stiffness)
         hanging = stretched - float(np.linalg.norm(drum - undeformed - deflection))
         states = carriage.states

@@ -20,7 +20,7 @@ from aframe_env.dynamics.rfem.beam import Array
 from aframe_env.dynamics.rfem.chain import Division, Structure, one_chain
 from aframe_env.dynamics.rfem.constraints import Constraints, constrain, luffing_rotation, servomotor_rows
 from aframe_env.dynamics.rfem.three_beams import three_beams
-from aframe_env.validation import require_choice
+from aframe_env.validation import SmallRotationWarning, require_choice
 
 Layout: TypeAlias = Literal["one_chain", "three_beams"]
 """One chain with shared corner rfes (the paper's model), or three beams joined by 12 more reactions (its
@@ -32,8 +32,15 @@ SMALL_ROTATION = 0.05
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
-class SmallRotationWarning(UserWarning):
-    """An rfe has turned by more than the linear kinematics of eq. (10) can take."""
+def warn_of_rotation(largest: float, stacklevel: int = 2) -> bool:
+    """Warn with the figure when an rfe's rotation ``largest``, rad, is above SMALL_ROTATION; return whether it is."""
+    if largest > SMALL_ROTATION:
+        warnings.warn(
+            f"an rfe turned by {largest:.3g} rad: rotations are small by assumption (10), up to {SMALL_ROTATION} rad",
+            SmallRotationWarning,
+            stacklevel=stacklevel + 1,
+        )
+    return largest > SMALL_ROTATION
 
 
 @dataclass(frozen=True)
@@ -182,13 +189,7 @@ class FrameModel:
         """Largest rotation of an rfe, rad; warn with the figure when it passes 0.05 rad."""
         angles = position.reshape(-1, 6)[:, 3:]
         largest = float(np.sqrt(np.max(np.sum(angles**2, axis=1))))
-        if largest > SMALL_ROTATION:
-            warnings.warn(
-                f"an rfe turned by {largest:.3g} rad: rotations are small by assumption (10), "
-                f"up to {SMALL_ROTATION} rad",
-                SmallRotationWarning,
-                stacklevel=3,
-            )
+        warn_of_rotation(largest, stacklevel=3)
         return largest
 
 

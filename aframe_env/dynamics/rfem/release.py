@@ -46,6 +46,9 @@ def release(
         step: s; made a little smaller so that a whole number of them makes an output interval.
         output_interval: s.
         model: The frame's model, if it is not to be the default one.
+
+    Warns:
+        SmallRotationWarning: An rfe turns by more than 0.05 rad.
     """
     require_number("ramp", ramp, "s", low=0.0)
     require_number("duration", duration, "s", low=0.0, low_open=True)
@@ -62,7 +65,6 @@ def release(
     load = generalised_forces(frame, point_forces(crane, case))
     basis = frame.constraints.basis
     position = solve(frame, weight + load)
-    frame.warn_of_rotation(position)
     reduced_weight, reduced_load = scheme.reduce(weight), scheme.reduce(load)
     start = (position * frame.mass) @ basis
     factor = 1.0 if ramp > 0.0 else 0.0
@@ -80,6 +82,7 @@ def release(
         coordinates[output] = scheme.position, scheme.velocity
         factors[output] = factor
     history = coordinates @ basis.T
+    frame.warn_of_rotation(history[:, 0])
     down = frame.to_deck.T @ DOWN * (GRAVITY if case.own_weight else 0.0)
     return FrameHistory(
         model=frame,

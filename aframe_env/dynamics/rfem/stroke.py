@@ -16,7 +16,10 @@ from aframe_env.validation import require_number
 class Stroke:
     """Prescribed change s(t) of a rigid servomotor's length, longer is positive.
 
-    The frame is linear and its luffing angle stays: s must be so small that no rfe turns by more than 0.05 rad.
+    The frame is linear about the luffing angle that it was built with: a stroke turns its rfes by small rotations, it
+    does not carry the reference configuration along. That holds while no rfe turns by more than 0.05 rad (a
+    ``SmallRotationWarning`` says when one does): for the reference crane strokes of some 0.13 m, where S is 15 mm
+    outside its circle about the feet. To luff further, build the crane anew with another ``Frame.luffing_angle``.
     """
 
     change: Callable[[float], float]

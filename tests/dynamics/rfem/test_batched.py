@@ -10,18 +10,19 @@ import pytest
 from aframe_env.crane import Crane
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.flexible import layout as flex
-from aframe_env.dynamics.flexible.readout import FEET, SERVOMOTORS, UTILISATION
+from aframe_env.dynamics.flexible.readout import FEET, ROTATION, SERVOMOTORS, UTILISATION
 from aframe_env.dynamics.flexible.reduction import modal_frame
 from aframe_env.dynamics.flexible.tables import couples, newmark_beta
 from aframe_env.dynamics.rfem.chain import Division
 from aframe_env.dynamics.rfem.dynamics import DynamicCase, DynamicResult, simulate
-from aframe_env.dynamics.rfem.model import frame_model
+from aframe_env.dynamics.rfem.model import SMALL_ROTATION, frame_model
 from aframe_env.dynamics.rfem.reference import time_series
 from aframe_env.engine import Engine
 from aframe_env.flexible_engine import FlexibleEngine, Mesh
 from aframe_env.motion import Harmonic, HarmonicMotion
 from aframe_env.scenario import Scenario
 from aframe_env.section import Material, Servomotor
+from aframe_env.validation import SmallRotationWarning
 from train.verification import run_checks
 
 COARSE = Division(leg=5, beam=2)
@@ -55,7 +56,8 @@ def readout_of(result: DynamicResult) -> np.ndarray:
     history = result.frame
     stress = history.von_mises().max(axis=1) / Material().yield_strength
     parts = [history.displacement("S"), history.feet().reshape(-1, 6), history.servomotors(), stress[:, None]]
-    return np.hstack(parts)
+    rotation = np.linalg.norm(history.position.reshape(len(stress), -1, 6)[:, :, 3:], axis=2).max(axis=1)
+    return np.hstack([*parts, np.where(rotation > SMALL_ROTATION, rotation, 0.0)[:, None]])
 
 
 def assert_like(result: DynamicResult, run_of_engine, load: float, share: float) -> None:
@@ -65,7 +67,7 @@ def assert_like(result: DynamicResult, run_of_engine, load: float, share: float)
     assert np.abs(tension - result.tension).max() < share * np.ptp(result.tension)
     expected = readout_of(result)
     error, scale = np.abs(readout - expected).max(axis=0), np.ptp(expected, axis=0)
-    for kind in (slice(0, 3), slice(FEET, FEET + 6), slice(SERVOMOTORS, UTILISATION), slice(UTILISATION, None)):
+    for kind in (slice(0, 3), slice(FEET, FEET + 6), slice(SERVOMOTORS, UTILISATION), slice(UTILISATION, ROTATION)):
         assert (error[kind] <= share * np.maximum(scale[kind], 0.1 * scale[kind].max())).all()
 
 
@@ -73,6 +75,19 @@ def assert_like(result: DynamicResult, run_of_engine, load: float, share: float)
 def test_paper_case_is_that_of_the_full_model(modes):
     expected = simulate(DynamicCase(duration=5.0, step=2.5e-3), model=frame_model(Crane().frame, COARSE))
     assert_like(expected, run(Scenario.paper(), 5.0, Mesh(COARSE, modes)), 1e-6, 0.01)
+
+
+def test_rotation_of_a_soft_frame_is_that_of_the_full_model():
+    scenario = Scenario.paper(crane=stiff(0.07))
+    with pytest.warns(SmallRotationWarning):
+        result = simulate(
+            DynamicCase(scenario=scenario, duration=5.0, step=2.5e-3), model=frame_model(scenario.crane.frame, COARSE)
+        )
+    expected = readout_of(result)[:, ROTATION]
+    found = run(scenario, 5.0, Mesh(COARSE))[2][:, ROTATION]
+    assert expected.max() > 0.05
+    assert found == pytest.approx(expected, rel=1e-3)
+    assert not run(Scenario.paper(), 1.0, Mesh(COARSE))[2][:, ROTATION].any()
 
 
 def test_rough_sea_is_that_of_the_full_model():
@@ -138,7 +153,7 @@ def test_reduced_frame_is_the_full_one():
     full, reduced = (run(scenario, 30.0, Mesh(Division(), modes)) for modes in (None, 5))
     assert np.abs(full[0] - reduced[0]).max() < 1e-3 * np.ptp(full[0][:, 2])
     error, scale = np.abs(full[2] - reduced[2]).max(axis=0), np.ptp(full[2], axis=0)
-    assert (error[FEET:] < 0.01 * scale[FEET:]).all()
+    assert (error[FEET:ROTATION] < 0.01 * scale[FEET:ROTATION]).all()
 
 
 def test_halving_the_step_is_second_order():

@@ -11,10 +11,11 @@ from aframe_env.dynamics.rfem.model import frame_model
 from aframe_env.dynamics.rfem.reference import time_series
 from aframe_env.dynamics.rfem.release import release
 from aframe_env.dynamics.rfem.rope_law import rope_force
+from aframe_env.dynamics.rfem.statics import LoadCase
 from aframe_env.motion import Harmonic, HarmonicMotion
 from aframe_env.scenario import Scenario
 from aframe_env.section import Material, Servomotor
-from aframe_env.validation import InvalidValue
+from aframe_env.validation import InvalidValue, SmallRotationWarning
 from train.verification import run_checks
 from train.verification.cases import columns_of
 from train.verification.frame_checks import CASES, model, order
@@ -43,6 +44,13 @@ def test_instant_release_is_a_sum_of_modes():
     swings = np.cos(np.outer(history.time, 2 * math.pi * modes.frequency))
     pulley = (swings * amplitude) @ (frame.to_deck @ frame.pulley @ modes.shape).T
     assert np.abs(history.displacement("S") - pulley).max() < 2e-3 * np.abs(pulley).max()
+
+
+def test_release_of_too_great_a_load_warns_once():
+    case = LoadCase(forces={"S": (0.0, 0.0, -3e7)})
+    with pytest.warns(SmallRotationWarning) as caught:
+        release(Crane(), case, duration=0.1, step=1e-3, output_interval=0.01, model=model(5, 2))
+    assert len(caught) == 1
 
 
 def test_damped_release_comes_to_rest_under_its_weight():
@@ -140,6 +148,11 @@ def test_feet_and_cylinders_do_not_drift():
     result = simulate(DynamicCase(scenario=scenario, duration=20.0, step=0.02, output_interval=0.1), model=model(5, 2))
     assert result.frame.constraint_violation() < 1e-12
     assert np.ptp(result.frame.displacement("S")[:, 2]) > 1e-4
+    # What the linear length leaves out is what the displacements say: |u|²/(2 length).
+    beyond = run_checks.second_order_lengths(result)["servomotors C–N"].max()
+    moved = max(np.linalg.norm(result.frame.displacement(f"N_{side}"), axis=1).max() for side in "RL")
+    assert beyond == pytest.approx(moved**2 / (2.0 * 8.266), rel=0.02)
+    assert beyond > 1e-6
 
 
 def test_stress_follows_the_static_one():

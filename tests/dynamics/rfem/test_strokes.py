@@ -10,13 +10,13 @@ from aframe_env.dynamics.rfem.chain import Division
 from aframe_env.dynamics.rfem.constraints import luffing_rotation
 from aframe_env.dynamics.rfem.dynamics import DynamicCase, simulate
 from aframe_env.dynamics.rfem.energy import energy_balance
-from aframe_env.dynamics.rfem.model import frame_model
+from aframe_env.dynamics.rfem.model import SMALL_ROTATION, frame_model
 from aframe_env.dynamics.rfem.statics import solve
 from aframe_env.dynamics.rfem.stroke import Stroke, strokes_at
 from aframe_env.motion import HarmonicMotion
 from aframe_env.scenario import Scenario
 from aframe_env.section import Material, Servomotor
-from aframe_env.validation import InvalidValue
+from aframe_env.validation import InvalidValue, SmallRotationWarning
 from train.verification import run_checks
 from train.verification.frame_checks import model
 
@@ -47,6 +47,24 @@ def test_equal_strokes_luff_the_frame_as_a_rigid_body(layout, leg):
     assert np.abs(frame.deformation @ moved).max() < 1e-12 * stroke
     assert np.abs(frame.stiffness @ moved).max() < 1.0
     assert not (frame.pulley @ frame.lengthening).any()
+
+
+def test_range_of_a_stroke_is_as_stated():
+    frame = model(5, 2)
+    angle, turned = frame.frame.luffing_angle, SMALL_ROTATION
+    stroke = length(angle + turned) - length(angle)
+    assert stroke == pytest.approx(0.13, abs=0.005)
+    moved = solve(frame, np.zeros(frame.structure.size), np.full(2, stroke))
+    found = frame.to_deck @ frame.structure.translation("S") @ moved
+    reach = np.array([0.0, 0.0, frame.frame.height])
+    assert np.linalg.norm(luffing_rotation(angle) @ reach + found) - reach[2] == pytest.approx(15e-3, abs=2e-3)
+
+
+def test_a_stroke_beyond_its_range_warns_once():
+    strokes = (Stroke.smooth(0.2, 0.5), Stroke.smooth(0.2, 0.5))
+    with pytest.warns(SmallRotationWarning, match=r"turned by 0\.0[67]\d* rad") as caught:
+        simulate(DynamicCase(scenario=LIGHT, strokes=strokes, duration=0.6, step=5e-3), model=model(5, 2))
+    assert len(caught) == 1
 
 
 def test_slow_stroke_ends_in_the_static_solution():
