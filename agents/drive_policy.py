@@ -10,49 +10,57 @@ import numpy.typing as npt
 
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue
+from agents.drives import Drive
 from agents.optimisation import OptimisedDrive
 from agents.policy import FloatArray, Knowledge
 
 
 @dataclass
 class DrivePolicy:
-    """Follow a drive in every row, by the clock and the winch's limits alone.
-
-    The policy looks at no instrument: it reckons where its own commands have brought the drum, as the winch ramps at
-    its limit of acceleration. A drive that starts under way is caught up with first, since the drum starts at rest.
-    """
+    """Follow a drive in every row, by the clock and the winch's limits alone."""
 
     name: str
     drives: Sequence[OptimisedDrive]
     """One for each row."""
     knows: Knowledge = Knowledge.CLOCK
     """FUTURE where the drives were optimised for the very scenarios that they run in."""
-    _period: float = field(init=False, default=0.1)
-    _limits: FloatArray = field(init=False, default_factory=lambda: np.zeros((2, 0)))
-    _drives: FloatArray = field(init=False, default_factory=lambda: np.zeros((2, 0, 1)))
-    _angle: FloatArray = field(init=False, default_factory=lambda: np.zeros(0))
-    _speed: FloatArray = field(init=False, default_factory=lambda: np.zeros(0))
+    _follower: Follower = field(init=False)
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes; of the scenarios only the winch's limits are looked at."""
-        if len(scenarios) != len(self.drives):
-            raise InvalidValue(f"drives: {len(self.drives)} drives for {len(scenarios)} scenarios")
+        self._follower = Follower([found.drive for found in self.drives], scenarios, control_period)
+
+    def act(self, observation: npt.NDArray[np.float32], time: float) -> FloatArray:
+        """Drum speed commands (N,) rad/s."""
+        return self._follower.command(time)
+
+
+class Follower:
+    """Brings drums onto their drives and keeps them there, without a look at any instrument.
+
+    It reckons where its own commands have brought the drum, as the winch ramps at its limit of acceleration. A drive
+    that starts under way is caught up with first, since the drum starts at rest.
+    """
+
+    def __init__(self, drives: Sequence[Drive], scenarios: Sequence[Scenario], control_period: float) -> None:
+        """Begin N episodes with a drive each."""
+        if len(scenarios) != len(drives):
+            raise InvalidValue(f"drives: {len(drives)} drives for {len(scenarios)} scenarios")
         self._period = control_period
         winches = [s.crane.winch for s in scenarios]
         self._limits = np.array([[w.max_speed for w in winches], [w.max_acceleration for w in winches]])
         # Sampled at the control steps once and for all; after its end a drive stands still.
-        steps = max((int(d.drive.duration / control_period) for d in self.drives), default=0) + 2
+        steps = max((int(drive.duration / control_period) for drive in drives), default=0) + 2
         times = np.arange(steps) * control_period
-        self._drives = np.zeros((2, len(self.drives), steps))
-        for i, found in enumerate(self.drives):
-            drive = found.drive
+        self._drives = np.zeros((2, len(drives), steps))
+        for i, drive in enumerate(drives):
             self._drives[0, i] = drive.angle(np.minimum(times, drive.duration))
             self._drives[1, i] = np.where(times < drive.duration, drive.speed(times), 0.0)
         self._angle = np.zeros(len(scenarios))
         self._speed = np.zeros(len(scenarios))
 
-    def act(self, observation: npt.NDArray[np.float32], time: float) -> FloatArray:
-        """Drum speed commands (N,) rad/s that bring the drum to φ_H(t + T) at the end of the control step T."""
+    def command(self, time: float) -> FloatArray:
+        """Drum speeds (N,) rad/s that bring the drums to φ_H(t + T) at the end of the control step T."""
         period, (most, a) = self._period, self._limits
         step, last = round(time / period), self._drives.shape[2] - 1
         now = self._drives[0, :, min(step, last)]

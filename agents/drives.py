@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from aframe_env.dynamics.compiling import kernel
+from aframe_env.dynamics.motion import smooth_ramp
 from aframe_env.validation import InvalidValue, require_number
 
 FloatArray = npt.NDArray[np.float64]
@@ -152,6 +153,45 @@ class HarmonicDrive:
         return harmonic_samples(self.variables, np.asarray(time, dtype=np.float64))[1]
 
 
+@dataclass(frozen=True, kw_only=True)
+class RampedDrive:
+    """A sum of harmonics that builds up with the ship's motion: φ_H(t) = f(t) s(t) - f(0) s(0).
+
+    s(t) = Σ_i a_i sin(ω_i t + α_i); f is the quintic smoothstep from 0 to 1 over ``ramp`` s, or 1 where that is 0.
+    """
+
+    duration: float
+    """t_k, s."""
+    variables: FloatArray
+    """(a_1, ω_1, α_1, a_2, ...): (3 n,) rad, rad/s, rad."""
+    ramp: float = 0.0
+    """s."""
+
+    def __post_init__(self) -> None:
+        require_number("duration", self.duration, "s", low=0.0, low_open=True)
+        require_number("ramp", self.ramp, "s", low=0.0)
+        if self.variables.ndim != 1 or len(self.variables) % 3 or not np.isfinite(self.variables).all():
+            raise InvalidValue(f"variables of shape {self.variables.shape}: must be (3 n,), all finite")
+
+    def angle(self, time: npt.ArrayLike) -> FloatArray:
+        """φ_H, rad, at ``time`` s."""
+        return self._samples(np.asarray(time, dtype=np.float64))[0]
+
+    def speed(self, time: npt.ArrayLike) -> FloatArray:
+        """dφ_H/dt, rad/s."""
+        return self._samples(np.asarray(time, dtype=np.float64))[1]
+
+    def _samples(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+        turned, speed = harmonic_samples(self.variables, times)
+        at_start = float(np.sum(self.variables[0::3] * np.sin(self.variables[2::3])))
+        if not self.ramp:
+            return turned, speed
+        angle = turned + at_start
+        ramp = np.array([smooth_ramp(t, 1.0 / self.ramp, 0.0)[:2] for t in times.ravel().tolist()])
+        factor, rate = ramp.reshape(-1, 2).T.reshape(2, *times.shape)
+        return factor * angle, factor * speed + rate * angle
+
+
 def harmonic_samples(variables: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Angle and speed at ``times`` of the ``HarmonicDrive`` with these variables."""
     angle, speed = np.zeros(times.shape), np.zeros(times.shape)
@@ -160,6 +200,17 @@ def harmonic_samples(variables: FloatArray, times: FloatArray) -> tuple[FloatArr
         angle += a * (np.sin(argument) - math.sin(p))
         speed += a * w * np.cos(argument)
     return angle, speed
+
+
+def harmonic_tangents(variables: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Derivatives (T, 3 n) of angle and speed of the ``HarmonicDrive`` by its variables."""
+    a, w, p = variables.reshape(-1, 3).T
+    t = times[:, None]
+    argument = w * t + p
+    sine, cosine = np.sin(argument), np.cos(argument)
+    angle = (sine - np.sin(p), a * t * cosine, a * (cosine - np.cos(p)))
+    speed = (w * cosine, a * (cosine - w * t * sine), -a * w * sine)
+    return tuple(np.stack(parts, axis=2).reshape(len(times), -1) for parts in (angle, speed))  # type: ignore[return-value]
 
 
 @kernel

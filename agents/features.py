@@ -58,7 +58,8 @@ def features(observation: npt.NDArray[np.float32], quantities: tuple[Quantity, .
     mass, length = column["load_mass"], column["rope_length"]
     excess = column["rope_tension"] / (mass * GRAVITY) - 1.0
     derived = {
-        "depth_error": 2.0 * column["depth_error"],
+        # Beyond some metres only the side: there the agent does what it has learned nearer.
+        "depth_error": 4.0 * np.tanh(0.5 * column["depth_error"]),
         "load_velocity_z": 2.0 * column["load_velocity_z"] if "load_velocity_z" in column else None,
         "load_acceleration_z": 4.0 * excess,
         "pulley_velocity_z": column["pulley_velocity_z"],

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.compiling import kernel, source_digest
+from aframe_env.dynamics.compiling import kernel, scalar, source_digest
 from aframe_env.dynamics.integrator import rk4_step
 from aframe_env.engine import Engine
 from aframe_env.motion import require_coverage
@@ -65,6 +65,31 @@ def coarse_step(scenario: Scenario) -> float:
     return min(COARSE_STEP, COARSE_PHASE / scenario.rope_frequency)
 
 
+@scalar
+def _advance(x1, x2, x3, v1, v2, v3, a, b, c, angles, speeds, p, h):  # type: ignore[no-untyped-def]
+    """Inner step of length h: pulley a, b, c, drum angles and speeds at its start, middle and end."""
+    target, to_pulley, stiffness, damping, mass, gravity, free_length, radius = p
+    la, lb, lc = free_length + radius * angles[0], free_length + radius * angles[1], free_length + radius * angles[2]
+    ra, rb, rc = radius * speeds[0], radius * speeds[1], radius * speeds[2]
+    return rk4_step(
+        x1,
+        x2,
+        x3,
+        v1,
+        v2,
+        v3,
+        (a[0], a[1], a[2], a[3], a[4], a[5], la, ra, stiffness / la),
+        (b[0], b[1], b[2], b[3], b[4], b[5], lb, rb, stiffness / lb),
+        (c[0], c[1], c[2], c[3], c[4], c[5], lc, rc, stiffness / lc),
+        h,
+        target,
+        to_pulley,
+        damping,
+        mass,
+        gravity,
+    )
+
+
 @cache
 def _kernel() -> Callable[..., tuple[float, float, float]]:
     source: Any = source_digest()
@@ -80,33 +105,17 @@ def _kernel() -> Callable[..., tuple[float, float, float]]:
         errors: FloatArray,
     ) -> tuple[float, float, float]:
         source  # noqa: B018
-        target, to_pulley, stiffness, damping, mass, gravity, free_length, radius = p
+        target = p[0]
         x1, x2, x3, v1, v2, v3 = start
         omega1 = 0.0
         lowest = highest = x3 - target
         errors[0] = x3 - target
         for i in range((path.shape[0] - 1) // 2):
-            a, b, c = path[2 * i], path[2 * i + 1], path[2 * i + 2]
-            la = free_length + radius * angle[2 * i]
-            lb = free_length + radius * angle[2 * i + 1]
-            lc = free_length + radius * angle[2 * i + 2]
-            ra, rb, rc = radius * speed[2 * i], radius * speed[2 * i + 1], radius * speed[2 * i + 2]
-            x1, x2, x3, v1, v2, v3, cost, _ = rk4_step(
-                x1,
-                x2,
-                x3,
-                v1,
-                v2,
-                v3,
-                (a[0], a[1], a[2], a[3], a[4], a[5], la, ra, stiffness / la),
-                (b[0], b[1], b[2], b[3], b[4], b[5], lb, rb, stiffness / lb),
-                (c[0], c[1], c[2], c[3], c[4], c[5], lc, rc, stiffness / lc),
-                h,
-                target,
-                to_pulley,
-                damping,
-                mass,
-                gravity,
+            k = 2 * i
+            angles = (angle[k], angle[k + 1], angle[k + 2])
+            speeds = (speed[k], speed[k + 1], speed[k + 2])
+            x1, x2, x3, v1, v2, v3, cost, _ = _advance(  # type: ignore[no-untyped-call]
+                x1, x2, x3, v1, v2, v3, path[k], path[k + 1], path[k + 2], angles, speeds, p, h
             )
             omega1 += cost
             error = x3 - target
@@ -114,6 +123,44 @@ def _kernel() -> Callable[..., tuple[float, float, float]]:
             lowest = min(lowest, error)
             highest = max(highest, error)
         return omega1, lowest, highest
+
+    return evaluate
+
+
+@cache
+def _lanes_kernel() -> Callable[..., None]:
+    source: Any = source_digest()
+
+    @kernel
+    def evaluate(
+        path: FloatArray,
+        angle: FloatArray,
+        speed: FloatArray,
+        more_angle: FloatArray,
+        more_speed: FloatArray,
+        start: tuple[float, ...],
+        p: tuple[float, ...],
+        h: float,
+        errors: FloatArray,
+    ) -> None:
+        source  # noqa: B018
+        target = p[0]
+        lanes = more_angle.shape[1]
+        x1, x2, x3 = np.full(lanes, start[0]), np.full(lanes, start[1]), np.full(lanes, start[2])
+        v1, v2, v3 = np.full(lanes, start[3]), np.full(lanes, start[4]), np.full(lanes, start[5])
+        errors[0] = start[2] - target
+        for i in range((path.shape[0] - 1) // 2):
+            k = 2 * i
+            a, b, c = path[k], path[k + 1], path[k + 2]
+            angle_a, angle_b, angle_c = angle[k], angle[k + 1], angle[k + 2]
+            speed_a, speed_b, speed_c = speed[k], speed[k + 1], speed[k + 2]
+            for j in range(lanes):
+                angles = (angle_a + more_angle[k, j], angle_b + more_angle[k + 1, j], angle_c + more_angle[k + 2, j])
+                speeds = (speed_a + more_speed[k, j], speed_b + more_speed[k + 1, j], speed_c + more_speed[k + 2, j])
+                x1[j], x2[j], x3[j], v1[j], v2[j], v3[j], _, _ = _advance(  # type: ignore[no-untyped-call]
+                    x1[j], x2[j], x3[j], v1[j], v2[j], v3[j], a, b, c, angles, speeds, p, h
+                )
+                errors[i + 1, j] = x3[j] - target
 
     return evaluate
 
@@ -162,6 +209,24 @@ class Objective:
             self.path, angle, speed, self._start, self._parameters, self.step, self._errors
         )
         return Outcome(omega1, max(-lowest, highest), lowest, highest, self.duration)
+
+    def errors(self, angle: FloatArray, speed: FloatArray) -> FloatArray:
+        """x_L3 - h at the inner steps, (steps + 1,) m, under an angle and speed given at ``times``."""
+        self.evaluate(angle, speed)
+        return self._errors.copy()
+
+    def errors_beside(
+        self, angle: FloatArray, speed: FloatArray, more_angle: FloatArray, more_speed: FloatArray
+    ) -> FloatArray:
+        """x_L3 - h (steps + 1, n) m of n neighbours of a drive: ``more_angle``, ``more_speed`` (times, n) are added.
+
+        The neighbours run side by side, in the lanes of the processor's registers.
+        """
+        errors = np.empty((self.steps + 1, more_angle.shape[1]))
+        _lanes_kernel()(
+            self.path, angle, speed, more_angle, more_speed, self._start, self._parameters, self.step, errors
+        )
+        return errors
 
     def drive(self, drive: Drive) -> Outcome:
         """Outcome of a drive."""

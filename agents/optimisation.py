@@ -2,14 +2,17 @@
 
 The guess is the inverse of the model's vertical motion: the rope that a load held at h would need while the pulley
 moves. Restarts around the best vertex, with a fresh simplex, take Nelder-Mead out of the stalls it is known for.
+
+Beside it, for Ω1: Gauss-Newton on the depth error at the inner steps. The drive enters the error nearly linearly, so
+a few steps do; a Jacobian is the run of one neighbour of the drive for each variable, all side by side.
 """
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Final, Literal
 
 import numpy as np
@@ -17,12 +20,13 @@ import numpy.typing as npt
 from scipy.optimize import least_squares, minimize
 
 from aframe_env.scenario import Scenario
-from aframe_env.validation import require_choice, require_integer, require_number
+from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
 from agents.drives import (
     Drive,
     HarmonicDrive,
     SplineDrive,
     harmonic_samples,
+    harmonic_tangents,
     spline_matrices,
     uniform_harmonic_samples,
 )
@@ -31,12 +35,17 @@ from agents.objectives import FINE_STEP, Objective, Outcome, coarse_step
 FloatArray = npt.NDArray[np.float64]
 Family = Literal["spline", "harmonic"]
 ObjectiveName = Literal["omega1", "omega2"]
+Optimiser = Literal["nelder-mead", "gauss-newton"]
 FAMILIES: Final[tuple[Family, ...]] = ("spline", "harmonic")
 OBJECTIVES: Final[tuple[ObjectiveName, ...]] = ("omega1", "omega2")
+OPTIMISERS: Final[tuple[Optimiser, ...]] = ("nelder-mead", "gauss-newton")
 Progress = Callable[[int, float], object]
 """Called with the number of evaluations so far and the best value of the objective."""
 
 _IMPROVEMENT = 2e-3  # a round of Nelder-Mead that gains less than this share ends the search
+_NEIGHBOUR = 1e-4  # m of rope between a drive and the neighbours that give its Jacobian
+_TOLERANCE = 1e-6  # a Gauss-Newton step that gains less than this share of Ω1 is the last one
+_UNUSABLE = 1e6  # m: stands for an error that is not a number
 _LEAST_SCALE = 0.02  # m of rope: a harmonic smaller than this is scaled as if it were this large
 
 
@@ -87,12 +96,17 @@ def optimise(
     seed: int = 0,
     max_evaluations: int = 6_000,
     progress: Progress | None = None,
+    *,
+    optimiser: Optimiser = "nelder-mead",
+    start: npt.ArrayLike | None = None,
 ) -> OptimisedDrive:
     """Find the drive of a family that makes an objective least on a scenario whose future is known.
 
     ``duration`` is t_k [s]; ``intervals`` (of a spline) is in [3, 500], ``harmonics`` in [1, 64]. The same
-    arguments give the same drive; ``seed`` turns the simplexes of the restarts. Raises InvalidValue for arguments
-    out of range.
+    arguments give the same drive; ``seed`` turns the simplexes of the restarts. The search for Ω2 starts from the
+    optimum of Ω1, which ``optimiser`` finds; it is itself always Nelder-Mead's, for Ω2 is no sum of squares.
+    ``start`` gives decision variables to start from, such as those of a like scenario's drive; their number is then
+    ``intervals``, or 3 ``harmonics``. Raises InvalidValue for arguments out of range.
     """
     require_choice("family", family, FAMILIES)
     require_choice("objective", objective, OBJECTIVES)
@@ -101,18 +115,22 @@ def optimise(
     require_integer("harmonics", harmonics, low=1, high=64)
     require_integer("seed", seed, low=0, high=2**32 - 1)
     require_integer("max_evaluations", max_evaluations, low=1, high=10**9)
+    require_choice("optimiser", optimiser, OPTIMISERS)
+    size = intervals if family == "spline" else 3 * harmonics
+    given = None if start is None else np.asarray(start, dtype=np.float64)
+    if given is not None and (given.shape != (size,) or not np.isfinite(given).all()):
+        raise InvalidValue(f"start of shape {given.shape}: must be {size} finite decision variables")
     begin = time.perf_counter()
     coarse = Objective(scenario, duration, coarse_step(scenario))
+    guess = _spline_guess(coarse, intervals, given) if family == "spline" else _harmonic_guess(coarse, harmonics, given)
+    first = max_evaluations if objective == "omega1" else max(1, max_evaluations // 2)
     search = _Search(coarse, max_evaluations, np.random.default_rng(seed), progress)
-    needed = required_angle(coarse)
-    if family == "spline":
-        x, scale, sample = _spline_start(coarse, needed, intervals)
+    if optimiser == "gauss-newton":
+        x, search.evaluations = _gauss_newton(coarse, guess, first, progress)
     else:
-        x, scale, sample = _harmonic_start(coarse, needed, harmonics)
-    share = 0.5 if objective == "omega2" else 1.0
-    x = search.run(x, scale, sample, "omega1", int(share * max_evaluations))
+        x = search.run(guess.x, guess, "omega1", first)
     if objective == "omega2":
-        x = search.run(x, scale, sample, "omega2", max_evaluations)
+        x = search.run(x, guess, "omega2", max_evaluations)
     drive: Drive = (SplineDrive if family == "spline" else HarmonicDrive).from_variables(x, float(duration))
     seconds = time.perf_counter() - begin
     outcome = Objective(scenario, duration, min(FINE_STEP, coarse.step)).drive(drive)
@@ -129,37 +147,36 @@ def optimise(
     )
 
 
-Sample = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+@dataclass(frozen=True)
+class _Guess:
+    """Where a search starts, and the family that it searches in."""
+
+    x: FloatArray
+    """Decision variables."""
+    scale: FloatArray
+    """What moves about one metre of rope, for each variable."""
+    sample: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+    """Angle and speed (T,) of a drive at the objective's times, from its variables (n,)."""
+    tangents: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+    """Their derivatives (T, n) by the variables."""
 
 
-def _spline_start(objective: Objective, needed: FloatArray, intervals: int) -> tuple[FloatArray, FloatArray, Sample]:
+def _spline_guess(objective: Objective, intervals: int, given: FloatArray | None) -> _Guess:
     angle, speed = spline_matrices(objective.duration, intervals, objective.times)
     # Least squares, not mere interpolation: with few intervals the knots share the error.
-    x = np.linalg.lstsq(angle, needed, rcond=None)[0]
+    x = np.linalg.lstsq(angle, required_angle(objective), rcond=None)[0] if given is None else given
     scale = np.full(intervals, 1.0 / objective.scenario.crane.winch.drum_radius)
+    return _Guess(
+        x=np.asarray(x, dtype=np.float64),
+        scale=scale,
+        sample=lambda v: (angle @ v, speed @ v),
+        tangents=lambda v: (angle, speed),
+    )
 
-    def sample(v: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return angle @ v, speed @ v
 
-    return np.asarray(x, dtype=np.float64), scale, sample
-
-
-def _harmonic_start(objective: Objective, needed: FloatArray, harmonics: int) -> tuple[FloatArray, FloatArray, Sample]:
-    """Harmonics taken one by one from the residual's spectrum, all fitted anew after each."""
+def _harmonic_guess(objective: Objective, harmonics: int, given: FloatArray | None) -> _Guess:
     times = objective.times
-    taken = slice(None, None, max(1, len(times) // 600))  # enough for waves; the fit stays quick
-    t, y = times[taken], needed[taken]
-    x = np.empty(0)
-    for _ in range(harmonics):
-        residual = y - harmonic_samples(x, t)[0]
-        guess = _strongest(t, residual)
-        x = least_squares(
-            partial(_residual, t=t, y=y),
-            np.concatenate([x, guess]),
-            jac=partial(_jacobian, t=t),
-            x_scale=np.tile([1.0, 0.1, 1.0], len(x) // 3 + 1),
-            max_nfev=60,
-        ).x
+    x = _fitted_harmonics(times, required_angle(objective), harmonics) if given is None else given
     radius = objective.scenario.crane.winch.drum_radius
     size = np.maximum(np.abs(x[0::3]), _LEAST_SCALE / radius)
     # A change of one unit of each scaled variable moves about one metre of rope.
@@ -168,7 +185,36 @@ def _harmonic_start(objective: Objective, needed: FloatArray, harmonics: int) ->
     scale[1::3] = 2.0 / (size * radius * objective.duration)
     scale[2::3] = 1.0 / (size * radius)
     step, count = float(times[1]), len(times)
-    return x, scale, lambda v: uniform_harmonic_samples(v, step, count)
+    return _Guess(
+        x=x,
+        scale=scale,
+        sample=lambda v: uniform_harmonic_samples(v, step, count),
+        tangents=lambda v: harmonic_tangents(v, times),
+    )
+
+
+def _fitted_harmonics(times: FloatArray, needed: FloatArray, harmonics: int) -> FloatArray:
+    """Harmonics taken one by one from the residual's spectrum, all fitted anew after each."""
+    taken = slice(None, None, max(1, len(times) // 600))  # enough for waves; the fit stays quick
+    t, y = times[taken], needed[taken]
+
+    def residual(v: FloatArray) -> FloatArray:
+        return harmonic_samples(v, t)[0] - y
+
+    def jacobian(v: FloatArray) -> FloatArray:
+        return harmonic_tangents(v, t)[0]
+
+    x = np.empty(0)
+    for _ in range(harmonics):
+        guess = _strongest(t, -residual(x))
+        x = least_squares(
+            residual,
+            np.concatenate([x, guess]),
+            jac=jacobian,
+            x_scale=np.tile([1.0, 0.1, 1.0], len(x) // 3 + 1),
+            max_nfev=60,
+        ).x
+    return x
 
 
 def _strongest(t: FloatArray, signal: FloatArray) -> FloatArray:
@@ -183,17 +229,48 @@ def _strongest(t: FloatArray, signal: FloatArray) -> FloatArray:
     return np.array([np.hypot(s, c), frequency, np.arctan2(c, s)])
 
 
-def _residual(variables: FloatArray, t: FloatArray, y: FloatArray) -> FloatArray:
-    return harmonic_samples(variables, t)[0] - y
+def _gauss_newton(
+    objective: Objective, guess: _Guess, budget: int, progress: Progress | None
+) -> tuple[FloatArray, int]:
+    """Variables of least Ω1 found within a budget of evaluations, and how many it took.
 
+    Gauss-Newton in a trust region. Each neighbour of the drive that gives a column of a Jacobian is an evaluation.
+    """
+    weight = np.full(objective.steps + 1, math.sqrt(objective.step))
+    weight[[0, -1]] *= math.sqrt(0.5)
+    size = len(guess.x)
+    evaluations, best = 0, math.inf
 
-def _jacobian(variables: FloatArray, t: FloatArray) -> FloatArray:
-    """Derivatives of the harmonic drive's angle by its variables: (T, 3 n)."""
-    a, w, p = variables.reshape(-1, 3).T
-    argument = np.outer(t, w) + p
-    cosine = a * np.cos(argument)
-    parts = (np.sin(argument) - np.sin(p), cosine * t[:, None], cosine - a * np.cos(p))
-    return np.stack(parts, axis=2).reshape(len(t), -1)
+    def variables(y: FloatArray) -> FloatArray:
+        return guess.x + guess.scale * y
+
+    def error(y: FloatArray) -> FloatArray:
+        nonlocal evaluations, best
+        evaluations += 1
+        result = weight * np.nan_to_num(objective.errors(*guess.sample(variables(y))), nan=_UNUSABLE)
+        best = min(best, float(result @ result))
+        if progress is not None:
+            progress(evaluations, best)
+        return np.asarray(result)
+
+    def jacobian(y: FloatArray) -> FloatArray:
+        nonlocal evaluations
+        evaluations += size
+        angle, speed = guess.sample(variables(y))
+        more = [_NEIGHBOUR * guess.scale * each for each in guess.tangents(variables(y))]
+        beside = objective.errors_beside(angle, speed, *more)
+        return np.asarray(weight[:, None] * (beside - objective.errors(angle, speed)[:, None]) / _NEIGHBOUR)
+
+    found = least_squares(
+        error,
+        np.zeros(size),
+        jac=jacobian,
+        ftol=_TOLERANCE,
+        xtol=1e-10,
+        gtol=None,
+        max_nfev=max(1, budget // (size + 1)),
+    )
+    return variables(found.x), evaluations
 
 
 class _Search:
@@ -206,9 +283,9 @@ class _Search:
         self._rng = rng
         self._progress = progress
 
-    def run(self, x: FloatArray, scale: FloatArray, sample: Sample, name: ObjectiveName, until: int) -> FloatArray:
+    def run(self, x: FloatArray, guess: _Guess, name: ObjectiveName, until: int) -> FloatArray:
         """Best variables found from ``x`` before ``until`` evaluations; one unit of scale is a metre of rope."""
-        centre = x
+        centre, scale, sample = x, guess.scale, guess.sample
         size = len(x)
         best_y = np.zeros(size)
         best = np.inf

@@ -18,7 +18,13 @@ def first_table(path):
 
 
 @pytest.mark.parametrize(
-    "name", ["results/ppo/comparison.md", "results/drives-paper/notes.md", "results/verification/README.md"]
+    "name",
+    [
+        "results/ppo/comparison.md",
+        "results/drives-paper/notes.md",
+        "results/drive-map/notes.md",
+        "results/verification/README.md",
+    ],
 )
 def test_tables_are_those_of_the_results(name):
     for line in first_table(ROOT / name):

@@ -23,7 +23,16 @@ from aframe_env.scenario import Initial, Scenario
 from aframe_env.scenario_file import read_scenario, scenario_text
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
 from agents.objectives import FINE_STEP, Objective, coarse_step
-from agents.optimisation import FAMILIES, OBJECTIVES, Family, ObjectiveName, optimise, required_angle
+from agents.optimisation import (
+    FAMILIES,
+    OBJECTIVES,
+    OPTIMISERS,
+    Family,
+    ObjectiveName,
+    Optimiser,
+    optimise,
+    required_angle,
+)
 from agents.optimisation import Progress as SearchProgress
 from train.config import parse
 from train.drive_experiment.figures import draw
@@ -56,6 +65,8 @@ class Options:
     """Family of drives."""
     objective: Literal["omega1", "omega2", "both"] = "both"
     """What is made least: omega1 = ∫(x−h)² dt, omega2 = max|x−h|."""
+    optimiser: Optimiser = "nelder-mead"
+    """What finds the least Ω1: the source's Nelder-Mead, or Gauss-Newton. Ω2 is Nelder-Mead's in either case."""
     duration: float = 36.0
     """How long the drive runs, s."""
     intervals: int = 18
@@ -78,6 +89,7 @@ class Options:
             raise InvalidValue("case, scenario: give one of the two")
         require_choice("drive", self.drive, (*FAMILIES, "both"))
         require_choice("objective", self.objective, (*OBJECTIVES, "both"))
+        require_choice("optimiser", self.optimiser, OPTIMISERS)
         require_number("duration", self.duration, "s", low=0.1, high=3600.0)
         require_integer("intervals", self.intervals, low=3, high=500)
         require_integer("harmonics", self.harmonics, low=1, high=64)
@@ -124,6 +136,7 @@ def solve(scenario: Scenario, options: Options, follow: Callable[[str], SearchPr
                 options.seed,
                 options.max_evaluations,
                 follow(f"{family[0].upper()}-Ω{name[-1]}"),
+                optimiser=options.optimiser,
             )
             row = SummaryRow(
                 family,

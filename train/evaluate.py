@@ -16,6 +16,7 @@ from rich.console import Console
 
 from aframe_env.flexible_engine import mesh_of
 from aframe_env.validation import require_integer
+from agents.drive_map import load as load_map
 from agents.learned import load
 from train.config import parse, to_toml
 from train.held_out import evaluate
@@ -36,6 +37,8 @@ class Options:
     """Held-out scenarios."""
     privileged: int = 20
     """The first so many of them for the drives that are optimised with the whole future known."""
+    drive_map: Path | None = None
+    """Folder of a drive map, such as results/drive-map, to run as well."""
     out: Path | None = None
     """Output folder; by default runs/evaluate-DATE-TIME."""
     overwrite: bool = False
@@ -52,6 +55,7 @@ def main() -> int:
     with user_errors():
         options, console = parse(Options, __doc__ or ""), Console()
         policy = load(options.agent)
+        stored = None if options.drive_map is None else load_map(options.drive_map)
         folder = new_folder(
             options.out or Path("runs") / f"evaluate-{datetime.now():%Y%m%d-%H%M%S}", overwrite=options.overwrite
         )
@@ -67,6 +71,7 @@ def main() -> int:
                 console,
                 model=options.model,
                 rfem_modes=options.rfem_modes,
+                drive_map=stored,
             )
         except KeyboardInterrupt:
             console.print("interrupted: no comparison was written")

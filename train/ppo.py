@@ -73,9 +73,9 @@ class Options:
     """Units of each hidden layer."""
     log_std_init: float = -2.5
     """Logarithm of the first standard deviation of an action (a share of the speed limit)."""
-    horizon: float = 20.0
+    horizon: float = 30.0
     """Rows start a new scenario after this time, s."""
-    drift_limit: float = 4.0
+    drift_limit: float = 10.0
     """Depth error at which a row starts anew, m; its last state's value stands for the rest."""
     reward_scale: float = 1.0
     """Reward for a metre of root mean square depth error over a step."""

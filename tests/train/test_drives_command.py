@@ -126,13 +126,25 @@ def test_a_folder_with_something_in_it_is_kept(tmp_path, monkeypatch, capsys):
 
 
 def test_ctrl_c_leaves_nothing_half_written(tmp_path, monkeypatch):
-    def interrupted(*arguments):
+    def interrupted(*arguments, **options):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(drives, "optimise", interrupted)
     out = tmp_path / "out"
     assert command(monkeypatch, "--out", out) == 130
     assert not list(out.iterdir())
+
+
+def test_gauss_newton_finds_omega1_and_leaves_omega2_to_nelder_mead(tmp_path, monkeypatch):
+    rows = {}
+    for optimiser in ("nelder-mead", "gauss-newton"):
+        out = tmp_path / optimiser
+        options = ("--drive", "harmonic", "--duration", 12, "--optimiser", optimiser, "--out", out)
+        assert command(monkeypatch, *options) == 0
+        rows[optimiser] = json.loads((out / "summary.json").read_text())[1:]
+    for plain, quick in zip(rows["nelder-mead"], rows["gauss-newton"], strict=True):
+        assert quick[quick["objective"]] <= 1.02 * plain[plain["objective"]]
+    assert rows["gauss-newton"][0]["evaluations"] < 0.5 * rows["nelder-mead"][0]["evaluations"]
 
 
 def test_run_records_command_and_versions(tmp_path, monkeypatch):

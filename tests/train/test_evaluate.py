@@ -5,7 +5,8 @@ import pytest
 
 from train import evaluate
 
-AGENT = Path(__file__).parents[2] / "results" / "ppo"
+RESULTS = Path(__file__).parents[2] / "results"
+AGENT, MAP = RESULTS / "ppo", RESULTS / "drive-map"
 
 
 def command(monkeypatch, *arguments):
@@ -16,11 +17,13 @@ def command(monkeypatch, *arguments):
 @pytest.mark.parametrize("model", ["simplified", "rfem"])
 def test_the_committed_agent_is_as_good_as_the_results_say(model, tmp_path, monkeypatch):
     out = tmp_path / "out"
-    few = ("--scenarios", 12, "--privileged", 0)
+    few = ("--scenarios", 12, "--privileged", 0, "--drive-map", MAP)
     assert command(monkeypatch, "--agent", AGENT, "--model", model, *few, "--out", out) == 0
     rows = {row["policy"]: row for row in json.loads((out / "comparison.json").read_text(encoding="utf-8"))}
     assert rows["PPO"]["reduction"]["median"] > 0.95
     assert rows["PPO"]["worse_than_still"] == 0
+    assert {"S-Ω1", "S-Ω2", "H-Ω1", "H-Ω2", "drive map"} <= set(rows)
+    assert all(row["knows"] == "clock" for name, row in rows.items() if name not in ("PPO", "drum still"))
     assert json.loads((out / "run.json").read_text())["command"].startswith("python -m train.evaluate --agent")
 
 

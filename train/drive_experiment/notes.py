@@ -29,9 +29,9 @@ PAPER = """\
   the 18-interval spline excites the load's bobbing (2.4 s, near the 2 s between its knots), which never dies. A load
   that starts with the deck's velocity, 1.05 m/s, bobs by 0.4 m at once, and no drive of these families stops that.
 - The spline ends with no second derivative, the harmonic is a sum of sines of free amplitude, frequency and phase;
-  the exact text of (33)-(36) is not available to us. Nelder-Mead starts from the inverse of the geometry and is
-  restarted until a round gains less than 0.2 %, where the source says only that it was used; Ω2 starts from the
-  optimum of Ω1.
+  the exact text of (33)-(36) is not available to us. Nelder-Mead (unless the command names another optimiser) starts
+  from the inverse of the geometry and is restarted until a round gains less than 0.2 %, where the source says only
+  that it was used; Ω2 starts from the optimum of Ω1.
 - The simplified model (rigid frame) is optimised on; the drum follows the drive exactly, as in the source, from a
   running start: dφ/dt at 0 is not zero.
 

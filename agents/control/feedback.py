@@ -1,0 +1,101 @@
+"""Feed-forward of the pulley's motion with feedback of the load's: what industry runs.
+
+The drum takes up whatever the pulley is about to move during the control step, and the regulator moves the rope's end
+to bring the load back to its level: proportional and derivative terms on the depth error and on the rope's stretch,
+matched to how the load at hand bobs on its rope (see ``regulator``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from aframe_env.scenario import Scenario
+from aframe_env.sensors import Sensors
+from aframe_env.task import SENSED, STATE
+from aframe_env.validation import require_number
+from agents.control.observer import Observer, PolynomialPredictor
+from agents.control.regulator import Gains, Lifts, Observation, Regulator
+from agents.policy import FloatArray, Knowledge
+
+STATE_GAINS = Gains(effort=0.087, share=0.018)
+"""Tuned with ``python -m train.tune_control``."""
+SENSOR_GAINS = Gains(effort=0.026, share=0.049)
+"""Tuned with ``python -m train.tune_control``."""
+
+
+@dataclass
+class StateFeedback:
+    """Feed-forward and feedback of the full state: the pulley's velocity and acceleration, the load, the tension."""
+
+    gains: Gains = STATE_GAINS
+    name: str = "feed-forward + feedback (state)"
+    knows: Knowledge = field(init=False, default=Knowledge.STATE)
+    _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
+    _period: float = field(init=False, repr=False, default=0.1)
+    _lifts: Lifts | None = field(init=False, repr=False, default=None)
+    _regulator: Regulator = field(init=False, repr=False)
+
+    def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
+        """Begin N episodes; of the scenarios only the crane is looked at."""
+        self._scenarios, self._period, self._lifts = scenarios, control_period, None
+
+    def act(self, observation: Observation, time: float) -> FloatArray:
+        """Drum speed commands (N,) rad/s for observations (N, 14) of the full state."""
+        if self._lifts is None:
+            self._lifts = Lifts(self._scenarios, self._period, STATE, observation)
+            self._regulator = self._lifts.regulator(self.gains)
+        lifts, period = self._lifts, self._period
+        winch, o = lifts.winch, lifts.columns(observation)
+        winch.speed = o["drum_speed"]
+        rope_end = o["depth_error"] + lifts.stretch(o)
+        rope_end_speed = o["pulley_velocity_z"] - winch.radius * o["drum_speed"]
+        z = np.stack([o["depth_error"], o["load_velocity_z"], rope_end, rope_end_speed], axis=1)
+        rise = period * (o["pulley_velocity_z"] + 0.5 * period * o["pulley_acceleration_z"])
+        command, _ = winch.command((rise - period * self._regulator.speed(z)) / winch.radius)
+        return command
+
+
+@dataclass
+class SensorFeedback:
+    """Feed-forward and feedback of what the sensors tell.
+
+    The readings are late by ``delay``, taken as whole control steps: the rope's model carries the estimates over it,
+    with what the drum did meanwhile and the pulley's motion as its velocity, acceleration and jerk foretell it.
+    """
+
+    gains: Gains = SENSOR_GAINS
+    delay: float = Sensors().delay
+    """From a motion to its reading, s."""
+    name: str = "feed-forward + feedback"
+    knows: Knowledge = field(init=False, default=Knowledge.SENSORS)
+    _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
+    _period: float = field(init=False, repr=False, default=0.1)
+    _lifts: Lifts | None = field(init=False, repr=False, default=None)
+    _regulator: Regulator = field(init=False, repr=False)
+    _observer: Observer = field(init=False, repr=False)
+    _turned: FloatArray = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        require_number("delay", self.delay, "s", low=0.0, high=10.0)
+
+    def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
+        """Begin N episodes; of the scenarios only the crane is looked at."""
+        self._scenarios, self._period, self._lifts = scenarios, control_period, None
+
+    def act(self, observation: Observation, time: float) -> FloatArray:
+        """Drum speed commands (N,) rad/s for readings (N, 10)."""
+        if self._lifts is None:
+            lifts = self._lifts = Lifts(self._scenarios, self._period, SENSED, observation)
+            self._regulator = lifts.regulator(self.gains)
+            model, o = lifts.model(self.gains.damping_ratio), lifts.columns(observation)
+            self._observer = Observer(lifts, model, self.delay, PolynomialPredictor(), o)
+        else:
+            lifts = self._lifts
+            self._observer.advance(self._turned, lifts.columns(observation))
+        rise = self._observer.rises(1)[0]
+        wanted = (rise - self._period * self._regulator.speed(self._observer.state())) / lifts.winch.radius
+        command, self._turned = lifts.winch.command(wanted)
+        return command

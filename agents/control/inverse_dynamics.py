@@ -1,0 +1,110 @@
+"""Inverse dynamics: the drum that a load at rest would need, from the ship's exact motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from aframe_env.dynamics import layout as at
+from aframe_env.engine import Engine
+from aframe_env.scenario import Scenario
+from aframe_env.task import STATE
+from agents.control.regulator import Gains, Lifts, Observation, Regulator
+from agents.policy import FloatArray, Knowledge
+
+GAINS = Gains(effort=0.069, share=0.016)
+"""Tuned with ``python -m train.tune_control``."""
+
+
+class RequiredRope:
+    """Length of rope that holds the load at its level, every half control step.
+
+    The pulley's path is the simulation's own. A load held at its level swings below the pulley S as a pendulum whose
+    rope bears its weight: x'' = g (S_x - x) / (S_z - h), y likewise. The rope bears m g / cos θ, and is as much
+    longer than its unstretched length as that stretches it.
+    """
+
+    def __init__(self, scenarios: Sequence[Scenario], control_period: float) -> None:
+        self._half = 0.5 * control_period
+        self._engine = Engine(len(scenarios), self._half, max_inner_step=0.2)
+        for i, scenario in enumerate(scenarios):
+            self._engine.reset_row(i, scenario)
+        self._still = np.zeros(len(scenarios))
+        self._level = np.array([s.target_level for s in scenarios])
+        self._weight = np.array([s.weight for s in scenarios])
+        self._gravity = np.array([s.gravity for s in scenarios])
+        self._axial_stiffness = np.array([s.crane.rope.axial_stiffness for s in scenarios])
+        self._to_pulley = np.array([s.crane.drum_to_pulley for s in scenarios])
+        self._free_length = np.array([s.free_length for s in scenarios])
+        self._place = self._engine.read_many(at.LOAD_POSITION, 2)
+        self._velocity = self._engine.read_many(at.LOAD_VELOCITY, 2)
+
+    def now(self) -> FloatArray:
+        """Rope to be paid out since the start, (N,) m."""
+        pulley = self._engine.read_many(at.PULLEY, 3)
+        height = pulley[:, 2] - self._level
+        length = np.sqrt(((pulley[:, :2] - self._place) ** 2).sum(axis=1) + height**2)
+        stretched = 1.0 + self._weight * length / height / self._axial_stiffness
+        return np.asarray((length + self._to_pulley) / stretched - self._free_length)
+
+    def advance(self) -> None:
+        """Go on by half a control step."""
+        # The pulley's place enters twice: a step of the Störmer-Verlet method.
+        self._velocity += 0.5 * self._half * self._pull()
+        self._place += self._half * self._velocity
+        self._engine.step(self._still)
+        self._velocity += 0.5 * self._half * self._pull()
+
+    def _pull(self) -> FloatArray:
+        pulley = self._engine.read_many(at.PULLEY, 3)
+        rate = self._gravity / (pulley[:, 2] - self._level)
+        return np.asarray(rate[:, None] * (pulley[:, :2] - self._place))
+
+
+@dataclass
+class InverseDynamics:
+    """Pay out what holds the load at its level, which keeps the rope's tension at its weight: the whole future known.
+
+    What it leaves is what the winch's limits leave; the regulator calms what they have stirred.
+    """
+
+    gains: Gains = GAINS
+    name: str = "inverse dynamics"
+    knows: Knowledge = field(init=False, default=Knowledge.FUTURE)
+    _lifts: Lifts | None = field(init=False, repr=False, default=None)
+    _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
+    _period: float = field(init=False, repr=False, default=0.1)
+    _regulator: Regulator = field(init=False, repr=False)
+    _rope: RequiredRope = field(init=False, repr=False)
+    _required: FloatArray = field(init=False, repr=False)
+    """(3, N) rope to be paid out half a control step ago, now, and in half a control step, m."""
+
+    def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
+        """Begin N episodes."""
+        self._scenarios, self._period, self._lifts = scenarios, control_period, None
+        self._rope = RequiredRope(scenarios, control_period)
+
+    def act(self, observation: Observation, time: float) -> FloatArray:
+        """Drum speed commands (N,) rad/s for observations (N, 14) of the full state."""
+        if self._lifts is None:
+            self._lifts = Lifts(self._scenarios, self._period, STATE, observation)
+            self._regulator = self._lifts.regulator(self.gains)
+            now = self._rope.now()
+            self._rope.advance()
+            later = self._rope.now()
+            self._required = np.stack([2.0 * now - later, now, later])
+        lifts, winch, period = self._lifts, self._lifts.winch, self._period
+        o = lifts.columns(observation)
+        winch.speed = o["drum_speed"]
+        before, now, later = self._required
+        rope_end = now - winch.radius * o["drum_angle"]
+        rope_end_speed = (later - before) / period - winch.radius * o["drum_speed"]
+        z = np.stack([o["depth_error"], o["load_velocity_z"], rope_end, rope_end_speed], axis=1)
+        self._rope.advance()
+        end = self._rope.now()
+        command, _ = winch.command((end - now - period * self._regulator.speed(z)) / winch.radius)
+        self._rope.advance()
+        self._required = np.stack([later, end, self._rope.now()])
+        return command

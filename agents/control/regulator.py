@@ -1,0 +1,112 @@
+"""The feedback law that the control policies share, and what it needs to know of the lifts at hand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from aframe_env.crane import GRAVITY
+from aframe_env.scenario import Scenario
+from aframe_env.task import Quantity
+from aframe_env.validation import InvalidValue, require_number
+from agents.control.rope import RopeModel
+from agents.control.winch import WinchModel
+from agents.policy import FloatArray
+
+Observation = npt.NDArray[np.float32]
+Columns = dict[str, FloatArray]
+"""An observation by the names of its quantities, each (N,)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gains:
+    """What is tuned of the law."""
+
+    effort: float
+    """Price of changing the rope end's speed, s²: m² of squared depth error per (m/s)²."""
+    share: float
+    """Share of the winch's acceleration that feedback may count on; the rest is the feed-forward's."""
+    damping_ratio: float = 0.03
+    """Damping of the load's bobbing on the rope that the law counts on, share of critical."""
+
+    def __post_init__(self) -> None:
+        require_number("effort", self.effort, "s²", low=1e-8, high=1e8)
+        require_number("share", self.share, "", low=0.0, high=1.0, low_open=True)
+        require_number("damping_ratio", self.damping_ratio, "of critical", low=0.0, high=1.0)
+
+
+@dataclass(frozen=True)
+class Regulator:
+    """Linear-quadratic regulator of the rope's end, kept within what the winch can do beside the feed-forward.
+
+    A plain linear law winds up where the sea asks for all that the winch has: it asks for more, gets it late, and
+    drives the load's bobbing on. So the rope's end moves at most ``amplitude`` to calm the bobbing, and approaches
+    its goal no faster than it can be stopped at ``acceleration``.
+    """
+
+    k: FloatArray
+    """(N, 4) gains on the state z of ``RopeModel``."""
+    amplitude: FloatArray
+    """(N,) m."""
+    acceleration: FloatArray
+    """(N,) m/s²."""
+
+    def speed(self, z: FloatArray) -> FloatArray:
+        """Speed (N,) m/s that the rope's end should have during the control step, from the state z (N, 4)."""
+        e, v, q, p = z.T
+        ke, kv, kq, kp = self.k.T
+        goal = np.clip((ke * (q - e) + kv * (p - v)) / (ke + kq), -self.amplitude, self.amplitude)
+        wanted = (ke + kq) / (kv + kp) * (goal - q)
+        braking = np.sqrt(2.0 * self.acceleration * abs(goal - q))
+        return np.asarray(p + (kv + kp) * (np.clip(wanted, -braking, braking) - p))
+
+
+class Lifts:
+    """Winches, loads and ropes of N rows, as far as a policy may know them: the crane, and what it observes."""
+
+    def __init__(
+        self,
+        scenarios: Sequence[Scenario],
+        control_period: float,
+        quantities: tuple[Quantity, ...],
+        observation: Observation,
+    ) -> None:
+        """Of the scenarios only the crane is looked at; ``observation`` (N, K) is the first."""
+        self.period = control_period
+        self.winch = WinchModel(scenarios, control_period)
+        self._columns = {q.name: i for i, q in enumerate(quantities)}
+        self._axial_stiffness = np.array([s.crane.rope.axial_stiffness for s in scenarios])
+        o = self.columns(observation)
+        self._weight = o["load_mass"] * GRAVITY
+        self.frequency = np.sqrt(self._axial_stiffness / (o["rope_length"] * o["load_mass"]))
+        """Of the loads' bobbing on their ropes, (N,) rad/s."""
+
+    def columns(self, observation: Observation) -> Columns:
+        """The observation (N, K) by the names of its quantities."""
+        if observation.shape[1] != len(self._columns):
+            raise InvalidValue(
+                f"observation: {observation.shape[1]} quantities, the policy reads {len(self._columns)}: "
+                f"{', '.join(self._columns)}"
+            )
+        return {name: observation[:, i].astype(np.float64) for name, i in self._columns.items()}
+
+    def model(self, damping_ratio: float) -> RopeModel:
+        """Linear model of the loads and ropes."""
+        return RopeModel.of(self.frequency, damping_ratio, self.period)
+
+    def regulator(self, gains: Gains) -> Regulator:
+        """Feedback law for the loads and ropes."""
+        acceleration = gains.share * self.winch.radius * self.winch.max_acceleration
+        k = self.model(gains.damping_ratio).gains(gains.effort)
+        return Regulator(k, acceleration / self.frequency**2, acceleration)
+
+    def stretch(self, o: Columns) -> FloatArray:
+        """Stretch (N,) m of the rope beyond that under the load's weight, as the tension tells."""
+        return np.asarray((o["rope_tension"] - self._weight) * o["rope_length"] / self._axial_stiffness)
+
+    def load_acceleration(self, o: Columns) -> FloatArray:
+        """Vertical acceleration (N,) m/s² of the load, as the tension tells."""
+        return np.asarray((o["rope_tension"] / self._weight - 1.0) * GRAVITY)

@@ -1,0 +1,64 @@
+"""The load on its elastic rope, linear and sampled: what the feedback laws are designed on.
+
+The state is z = (e, e', q, p): depth error e, its rate, q, where the load would come to rest if the upper end of the
+rope stayed as it is, and p = q'. The pulley raises q and the drum, paying out, lowers it: p = s' - r φ'. The load
+follows by e'' = ω² (q - e) + 2 ζ ω (p - e'). The input is the change of p, which the winch's acceleration limits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import expm, solve_discrete_are
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RopeModel:
+    """z(t + T) = A z(t) + B c of N rows, where c [m/s] is the change of p at the start of a control step T."""
+
+    a: FloatArray
+    """(N, 4, 4)."""
+    b: FloatArray
+    """(N, 4)."""
+
+    @classmethod
+    def of(cls, frequency: FloatArray, damping_ratio: float, period: float) -> RopeModel:
+        """Model of loads that bob on their ropes at ``frequency`` (N,) rad/s, sampled every ``period`` s."""
+        rate = np.zeros((len(frequency), 4, 4))
+        rate[:, 0, 1] = 1.0
+        rate[:, 1, 0] = -(frequency**2)
+        rate[:, 1, 1] = -2.0 * damping_ratio * frequency
+        rate[:, 1, 2] = frequency**2
+        rate[:, 1, 3] = 2.0 * damping_ratio * frequency
+        rate[:, 2, 3] = 1.0
+        a = expm(rate * period)
+        # A change of p at the start of the step is as good as a p that was there before it.
+        return cls(a, a[:, :, 3].copy())
+
+    def row(self, index: int) -> RopeModel:
+        """Model of one row."""
+        return RopeModel(self.a[index : index + 1], self.b[index : index + 1])
+
+    def advance(self, z: FloatArray, change: FloatArray) -> FloatArray:
+        """State (N, 4) a control step after ``z`` (N, 4), p having changed by ``change`` (N,) m/s."""
+        return np.asarray((self.a @ z[:, :, None])[:, :, 0] + self.b * change[:, None])
+
+    def costs_to_go(self, effort: float) -> FloatArray:
+        """P (N, 4, 4) of the least Σ e² + ``effort`` c² over an endless future: zᵀ P z; effort in s²."""
+        weight = np.diag([1.0, 0.0, 0.0, 0.0])
+        return np.stack(
+            [
+                solve_discrete_are(a, b[:, None], weight, np.array([[effort]]))
+                for a, b in zip(self.a, self.b, strict=True)
+            ]
+        )
+
+    def gains(self, effort: float) -> FloatArray:
+        """K (N, 4) of the feedback c = -K z with the least Σ e² + ``effort`` c² (linear-quadratic regulator)."""
+        pb = (self.costs_to_go(effort) @ self.b[:, :, None])[:, :, 0]
+        k = (pb[:, None, :] @ self.a)[:, 0, :]
+        return np.asarray(k / (effort + (pb * self.b).sum(axis=1))[:, None])

@@ -1,0 +1,176 @@
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import solve_discrete_are
+
+from aframe_env import Crane, Harmonic, HarmonicMotion, InvalidValue, Scenario, ScenarioDistribution, Sensors, Winch
+from agents.control.feedback import SensorFeedback, StateFeedback
+from agents.control.inverse_dynamics import InverseDynamics, RequiredRope
+from agents.control.regulator import Gains
+from agents.control.rope import RopeModel
+from agents.control.winch import WinchModel
+from agents.objectives import Objective
+from agents.policy import DrumStill
+from agents.rollout import held_out_scenarios, run
+
+PERIOD = 0.1
+HEAVE = HarmonicMotion(harmonics=(Harmonic(coordinate="heave", amplitude=1.0, period=9.0),))
+
+
+def sinusoid(**changes):
+    return Scenario(motion=HEAVE, load_mass=60.0e3, rope_damping=2.0e4, ramp=10.0, **changes)
+
+
+def test_the_rope_model_is_the_solution_of_its_differential_equation():
+    frequency, ratio = 3.0, 0.05
+    model = RopeModel.of(np.array([1.0, frequency]), ratio, PERIOD)
+    z, change = np.array([0.3, -0.2, 0.1, 0.4]), -0.25
+
+    def rate(_, y):
+        e, v, q, p = y
+        return [v, frequency**2 * (q - e) + 2.0 * ratio * frequency * (p - v), p, 0.0]
+
+    after = solve_ivp(rate, (0.0, PERIOD), z + np.array([0.0, 0.0, 0.0, change]), rtol=1e-10, atol=1e-12).y[:, -1]
+    advanced = model.advance(np.stack([z, z]), np.array([0.0, change]))
+    assert advanced[1] == pytest.approx(after, abs=1e-9)
+
+
+def test_the_gains_are_the_best_there_are():
+    """No other gains near them cost less over a long time, from any start."""
+    model = RopeModel.of(np.array([2.0]), 0.03, PERIOD)
+    effort = 0.01
+    k = model.gains(effort)
+    cost = solve_discrete_are(model.a[0], model.b[0][:, None], np.diag([1.0, 0.0, 0.0, 0.0]), [[effort]])
+
+    def spent(gains, start):
+        z, total = start[None].copy(), 0.0
+        for _ in range(3000):
+            change = -(gains * z).sum(axis=1)
+            total += z[0, 0] ** 2 + effort * change[0] ** 2
+            z = model.advance(z, change)
+        return total
+
+    rng = np.random.default_rng(0)
+    for start in np.eye(4):
+        best = spent(k, start)
+        assert best == pytest.approx(start @ cost @ start, rel=1e-6)
+        for _ in range(3):
+            assert spent(k * (1.0 + 0.1 * rng.standard_normal(4)), start) > best
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.08, 0.5])
+def test_a_command_turns_the_drum_as_far_as_wanted(lag):
+    """Against the environment's own winch."""
+    scenario = sinusoid(crane=Crane(winch=Winch(lag=lag)))
+    rng = np.random.default_rng(2)
+    winch = WinchModel([scenario], PERIOD)
+    turns, actual = [], []
+
+    class Turn:
+        name, knows = "turn", DrumStill.knows
+
+        def reset(self, scenarios, control_period):
+            pass
+
+        def act(self, observation, time):
+            actual.append(observation[0, 9:11])
+            wanted = PERIOD * winch.speed + rng.uniform(-0.02, 0.02, 1) * (0.2 if lag else 1.0)
+            command, turned = winch.command(wanted)
+            turns.append((wanted[0], turned[0], winch.speed[0]))
+            return command
+
+    run(Turn(), [scenario], episode_duration=4.0)
+    wanted, turned, speed = np.array(turns).T
+    angle, drum_speed = np.array(actual, dtype=np.float64).T
+    assert np.diff(angle) == pytest.approx(turned[:-1], abs=1e-6)
+    assert drum_speed[1:] == pytest.approx(speed[:-1], abs=1e-6)
+    reached = abs(turned - wanted) < 1e-9
+    assert reached.mean() > (0.05 if lag == 0.5 else 0.3)
+    assert np.ptp(drum_speed) > 0.1
+
+
+def test_feed_forward_cancels_a_sinusoidal_heave():
+    """The drum's speed is s'/r, and the load stands still to within the winch's steps."""
+    scenario = sinusoid()
+    episodes = run(StateFeedback(), [scenario], episode_duration=60.0)
+    times = PERIOD * np.arange(601)
+    full = times > 11.0
+    w = 2.0 * np.pi / 9.0
+    expected = w * np.cos(w * times) / scenario.crane.winch.drum_radius
+    # The commanded speed is held for a control step: it is that of a middle of it.
+    assert abs(episodes.drum_speed[0] - expected)[full].max() < 0.6 * w**2 * PERIOD / 0.75
+    assert abs(episodes.error[0]).max() < 5e-3
+    assert abs(run(DrumStill(), [scenario], episode_duration=60.0).error[0]).max() > 0.9
+
+
+@pytest.mark.parametrize(("policy", "observation"), [(StateFeedback, "state"), (InverseDynamics, "state")])
+def test_what_a_sudden_start_stirs_is_calmed(policy, observation):
+    """The ship moves at once, the load is at rest: the regulator has to calm what that stirs, and not keep it up."""
+    scenario = dataclasses.replace(
+        sinusoid(),
+        motion=HarmonicMotion(harmonics=(Harmonic(coordinate="heave", amplitude=0.5, period=9.0),)),
+        ramp=0.0,
+    )
+    scenario = dataclasses.replace(scenario, initial="rest")
+    episodes = run(policy(), [scenario], observation=observation, episode_duration=60.0)
+    assert abs(episodes.error[0, :100]).max() > 1e-2
+    assert abs(episodes.error[0, 300:]).max() < 3e-3
+
+
+def test_required_rope_holds_the_load_without_feedback():
+    """A drum that follows it exactly (Objective has no winch limits) leaves the load where it was."""
+    scenario = ScenarioDistribution(rope_length=(200.0, 300.0)).draw(np.random.default_rng(5))
+    objective = Objective(scenario, 30.0, 0.01)
+    rope = RequiredRope([scenario], 0.01)
+    rope_out = []
+    for _ in objective.times:
+        rope_out.append(rope.now()[0])
+        rope.advance()
+    angle = np.array(rope_out) / scenario.crane.winch.drum_radius
+    outcome = objective.evaluate(angle, np.gradient(angle, objective.times, edge_order=2))
+    assert outcome.omega2 < 1e-3 * objective.still().omega2
+
+
+@pytest.mark.parametrize(
+    ("policy", "observation", "least"),
+    [(StateFeedback, "state", 0.99), (InverseDynamics, "state", 0.99), (SensorFeedback, "sensors", 0.95)],
+)
+def test_policies_act_alike_alone_and_in_a_batch_and_remove_the_heave(policy, observation, least):
+    scenarios = held_out_scenarios(ScenarioDistribution(), 12)
+    still = run(DrumStill(), scenarios, episode_duration=60.0)
+    together = run(policy(), scenarios, observation=observation, episode_duration=60.0)
+    assert np.median(1.0 - together.rms / still.rms) > least
+    alone = run(policy(), scenarios[:1], observation=observation, episode_duration=60.0)
+    assert alone.error[0] == pytest.approx(together.error[0], abs=1e-6)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.3])
+def test_the_delay_is_bridged(delay):
+    """Ideal sensors, only late: the prediction makes good what a pure delay would leave, 2 sin(π τ / T)."""
+    scenario = sinusoid()
+    sensors = dataclasses.replace(Sensors.ideal(), delay=delay)
+    episodes = run(SensorFeedback(delay=delay), [scenario], observation=sensors, episode_duration=60.0)
+    still = run(DrumStill(), [scenario], episode_duration=60.0)
+    left = episodes.rms[0] / still.rms[0]
+    assert left < 0.02
+    assert left < 0.25 * 2.0 * np.sin(np.pi * 0.3 / 9.0)
+
+
+def test_the_winchs_limits_are_survived():
+    """A sea that asks for far more than the winch has: no winding up, and still better than the drum left alone."""
+    motion = HarmonicMotion(harmonics=(Harmonic(coordinate="heave", amplitude=3.0, period=6.0),))
+    scenario = dataclasses.replace(sinusoid(), motion=motion)
+    still = run(DrumStill(), [scenario], episode_duration=60.0)
+    for policy, observation in ((StateFeedback(), "state"), (SensorFeedback(), "sensors")):
+        assert run(policy, [scenario], observation=observation).rms[0] < still.rms[0]
+
+
+def test_bad_input_is_refused():
+    with pytest.raises(InvalidValue, match=r"effort = 0.0 s²: must be in \[1e-08, 1e\+08\] s²"):
+        Gains(effort=0.0, share=0.1)
+    with pytest.raises(InvalidValue, match="share = 2"):
+        Gains(effort=1.0, share=2.0)
+    with pytest.raises(InvalidValue, match="the policy reads 14"):
+        run(StateFeedback(), held_out_scenarios(ScenarioDistribution(), 1), observation="sensors")

@@ -1,0 +1,1 @@
+"""What the drive map is held against, and how that is written."""

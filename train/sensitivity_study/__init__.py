@@ -1,0 +1,1 @@
+"""How policies take it when things are not what they were told."""

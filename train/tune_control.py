@@ -1,0 +1,156 @@
+"""Tune the gains of the control policies over training scenarios: ``python -m train.tune_control``.
+
+Nelder-Mead on the logarithms of effort and share, for the greatest mean heave reduction 1 - RMS / RMS(drum still). A
+mean, since the seas in which the winch's limits are met are few, and it is there that gains differ by more than a hair.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import shlex
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+from scipy.optimize import minimize
+
+from aframe_env import task
+from aframe_env.scenario import ScenarioDistribution
+from aframe_env.validation import InvalidValue, require_integer
+from agents.control.feedback import SENSOR_GAINS, STATE_GAINS, SensorFeedback, StateFeedback
+from agents.control.inverse_dynamics import GAINS as INVERSE_GAINS
+from agents.control.inverse_dynamics import InverseDynamics
+from agents.control.regulator import Gains
+from agents.policy import DrumStill, FloatArray, Policy
+from agents.rollout import HELD_OUT_SEED, run
+from train.config import parse, to_toml
+from train.output import new_folder, user_errors, versions, write_json, write_text
+
+Name = Literal["state", "sensors", "inverse-dynamics"]
+
+
+@dataclass(frozen=True)
+class Tunable:
+    """A policy of which the gains can be tuned."""
+
+    make: Callable[[Gains], Policy]
+    observation: task.Observation
+    start: Gains
+
+
+TUNABLE: dict[Name, Tunable] = {
+    "state": Tunable(StateFeedback, "state", STATE_GAINS),
+    "sensors": Tunable(SensorFeedback, "sensors", SENSOR_GAINS),
+    "inverse-dynamics": Tunable(InverseDynamics, "state", INVERSE_GAINS),
+}
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to tune, on how much."""
+
+    policies: tuple[Name, ...] = tuple(TUNABLE)
+    """Policies to tune."""
+    scenarios: int = 200
+    """Training scenarios."""
+    evaluations: int = 40
+    """Gains to try for each policy."""
+    seed: int = 1
+    """Of the training scenarios; never that of the held-out ones."""
+    out: Path = Path("runs/control")
+    """Output folder."""
+    overwrite: bool = False
+    """Write into the output folder even if it has something in it."""
+
+    def __post_init__(self) -> None:
+        require_integer("scenarios", self.scenarios, low=1, high=10**6)
+        require_integer("evaluations", self.evaluations, low=1, high=10**6)
+        require_integer("seed", self.seed, low=0, high=2**63 - 1)
+        if self.seed == HELD_OUT_SEED:
+            raise InvalidValue(f"seed = {self.seed}: is that of the held-out scenarios; choose another")
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Gains, and what came of them."""
+
+    gains: Gains
+    mean: float
+    """Mean heave reduction: what is sought."""
+    median: float
+    """Median heave reduction."""
+    fifth: float
+    """Heave reduction that 95 % of the scenarios exceed."""
+    worst: float
+    """Least heave reduction."""
+
+
+def study(tunable: Tunable, options: Options, tried: Callable[[Trial], object]) -> list[Trial]:
+    """Every trial of the search for one policy's gains; ``tried`` is called after each."""
+    distribution = ScenarioDistribution()
+    scenarios = [distribution.draw(np.random.default_rng([options.seed, i])) for i in range(options.scenarios)]
+    still = run(DrumStill(), scenarios).rms
+    trials: list[Trial] = []
+
+    def score(x: FloatArray) -> float:
+        effort, share = np.clip(10.0**x, (1e-7, 1e-3), (1e3, 1.0)).tolist()
+        gains = Gains(effort=effort, share=share)
+        left = run(tunable.make(gains), scenarios, observation=tunable.observation).rms / still
+        trial = Trial(
+            gains=gains,
+            mean=float(np.mean(1.0 - left)),
+            median=float(np.median(1.0 - left)),
+            fifth=float(np.quantile(1.0 - left, 0.05)),
+            worst=float(1.0 - left.max()),
+        )
+        trials.append(trial)
+        tried(trial)
+        return -trial.mean
+
+    start = np.log10([tunable.start.effort, tunable.start.share])
+    simplex = start + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.5]])
+    minimize(
+        score,
+        start,
+        method="Nelder-Mead",
+        options={"initial_simplex": simplex, "maxfev": options.evaluations, "xatol": 0.02, "fatol": 1e-5},
+    )
+    return trials
+
+
+def main() -> int:
+    """Run the command."""
+    with user_errors():
+        options, console = parse(Options, __doc__ or ""), Console()
+        folder = new_folder(options.out, overwrite=options.overwrite)
+        write_text(folder / "config.toml", to_toml(options))
+        command = shlex.join(["python", "-m", "train.tune_control", *sys.argv[1:]])
+        write_json(folder / "run.json", {"command": command, "versions": versions()})
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(["policy", "effort_s2", "share", "mean", "median", "fifth", "worst"])
+        with Progress(console=console) as progress:
+            for name in options.policies:
+                bar = progress.add_task(name, total=options.evaluations)
+                trials = study(TUNABLE[name], options, lambda _, bar=bar: progress.advance(bar))  # type: ignore[misc]
+                for t in trials:
+                    values = (t.gains.effort, t.gains.share, t.mean, t.median, t.fifth, t.worst)
+                    writer.writerow([name, *(f"{v:.6g}" for v in values)])
+                best = max(trials, key=lambda t: t.mean)
+                progress.update(bar, completed=options.evaluations)
+                console.print(
+                    f"{name}: {best.gains}: mean {best.mean:.2%}, median {best.median:.2%}, "
+                    f"5th percentile {best.fifth:.1%}, worst {best.worst:.1%}"
+                )
+                write_text(folder / "trials.csv", text.getvalue())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
