@@ -1,77 +1,199 @@
-"""From an observation in physical units to the inputs of a network: numbers of order one, nothing added.
+"""What agents see and do: from observations to the inputs of a network, and from its output to a drum speed.
 
-Each feature is a fixed function of the observation, so that an agent needs no running statistics and means the same
-on every crane and in every sea.
+The inputs are numbers of order one, each a fixed function of the observation and, for sensors, of a short memory of
+the readings, so that an agent needs no running statistics and means the same on every crane and in every sea. The
+output is a share of the change of speed that the winch is capable of within a control step: of the whole range of
+drum speeds only so much is in reach.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.crane import GRAVITY
+from aframe_env.crane import GRAVITY, Crane
+from aframe_env.sensors import Sensors
 from aframe_env.task import SENSED, STATE, Quantity
 from aframe_env.validation import InvalidValue
+from agents.control.regulator import Columns, Lifts, Observation
+from agents.estimation import ALL, HEAVE_MEMORY, FadingPolynomial, FloatArray, Rows
+from agents.kalman import RopeFilter, WaveBank, WaveFilter
 
 Float32Array = npt.NDArray[np.float32]
 
-_TYPICAL_STIFFNESS = 2.0e8  # N, turns tension into stretch: a scale, not a claim about the crane at hand
+LIMIT = 20.0
+"""Features are clipped to ± this."""
+_DAMPING_RATIO = 0.03  # of the load's bobbing on the rope, share of critical
+
+STATE_FEATURES = (
+    "depth_error",
+    "depth_error_near_zero",
+    "load_velocity_z",
+    "stretch_deviation",
+    "rope_end_speed",
+    "pulley_velocity_z",
+    "pulley_acceleration_z",
+    "pulley_heave",
+    "load_mass",
+    "rope_length",
+    "bobbing_rate",
+)
+SENSED_FEATURES = (
+    *STATE_FEATURES[:-3],
+    "pulley_acceleration_to_come",
+    "pulley_acceleration_after_that",
+    *STATE_FEATURES[-3:],
+)
 
 
 def feature_names(quantities: tuple[Quantity, ...]) -> tuple[str, ...]:
     """Names of the features of an observation with these quantities."""
     if quantities == STATE:
-        return (
-            "depth_error",
-            "load_velocity_z",
-            "load_acceleration_z",
-            "pulley_velocity_z",
-            "pulley_acceleration_z",
-            "drum_speed",
-            "stretch_deviation",
-            "pulley_heave",
-            "load_mass",
-            "rope_length",
-            "bobbing_rate",
-        )
+        return STATE_FEATURES
     if quantities == SENSED:
-        return (
-            "depth_error",
-            "load_acceleration_z",
-            "pulley_velocity_z",
-            "drum_speed",
-            "stretch_deviation",
-            "pulley_heave",
-            "roll",
-            "pitch",
-            "load_mass",
-            "rope_length",
-            "bobbing_rate",
-        )
+        return SENSED_FEATURES
     raise InvalidValue(f"no features for an observation of {[q.name for q in quantities]}")
 
 
-def features(observation: npt.NDArray[np.float32], quantities: tuple[Quantity, ...]) -> Float32Array:
-    """Features (N, F) of observations (N, K)."""
-    o = observation.astype(np.float64)
-    column = {q.name: o[:, i] for i, q in enumerate(quantities)}
-    mass, length = column["load_mass"], column["rope_length"]
-    excess = column["rope_tension"] / (mass * GRAVITY) - 1.0
-    derived = {
-        # Beyond some metres only the side: there the agent does what it has learned nearer.
-        "depth_error": 4.0 * np.tanh(0.5 * column["depth_error"]),
-        "load_velocity_z": 2.0 * column["load_velocity_z"] if "load_velocity_z" in column else None,
-        "load_acceleration_z": 4.0 * excess,
-        "pulley_velocity_z": column["pulley_velocity_z"],
-        "pulley_acceleration_z": column.get("pulley_acceleration_z"),
-        "drum_speed": 0.75 * column["drum_speed"],
-        "stretch_deviation": 4.0 * excess * mass * GRAVITY * length / _TYPICAL_STIFFNESS,
-        "pulley_heave": 0.5 * column["pulley_heave"],
-        "roll": 10.0 * column["roll"] if "roll" in column else None,
-        "pitch": 20.0 * column["pitch"] if "pitch" in column else None,
-        "load_mass": mass / 5.0e4 - 1.2,
-        "rope_length": length / 1.0e3 - 0.8,
-        "bobbing_rate": 0.25 * np.sqrt(_TYPICAL_STIFFNESS / (mass * length)) - 1.0,
-    }
-    stack = np.stack([np.asarray(derived[name]) for name in feature_names(quantities)], axis=1)
-    return np.asarray(np.clip(stack, -20.0, 20.0), dtype=np.float32)
+class StateFeatures:
+    """Features of N rows that observe the full state."""
+
+    names = STATE_FEATURES
+
+    def __init__(self, rows: int, control_period: float) -> None:
+        self._lifts = Lifts(rows, control_period, STATE)
+
+    def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
+        """Features (n, F) of the first observations (n, K) of these ``rows``, lifts with these ``cranes`` (n)."""
+        return self._look(self._lifts.start(cranes, observation, rows), rows)
+
+    def advance(self, observation: Observation) -> Float32Array:
+        """Features (N, F) of all rows, whose observations (N, K) are one control step later."""
+        return self._look(self._lifts.columns(observation), ALL)
+
+    def command(self, share: FloatArray) -> FloatArray:
+        """Drum speed commands (N,) rad/s for shares (N,) of what the winch can change."""
+        return self._lifts.winch.reach(share)
+
+    def _look(self, o: Columns, rows: Rows) -> Float32Array:
+        lifts = self._lifts
+        lifts.winch.speed[rows] = o["drum_speed"]
+        return _stacked(
+            *_of_the_load(o["depth_error"], o["load_velocity_z"], lifts.stretch(o, rows)),
+            _rope_end_speed(o["pulley_velocity_z"], lifts, rows),
+            o["pulley_velocity_z"],
+            o["pulley_acceleration_z"],
+            *_of_the_lift(o, lifts, rows),
+        )
+
+
+class SensedFeatures:
+    """Features of N rows that have sensors: what the readings, and the commands since, tell of the present."""
+
+    names = SENSED_FEATURES
+
+    def __init__(self, rows: int, control_period: float, sensors: Sensors) -> None:
+        self._period, self._sensors = control_period, sensors
+        self._delay = control_period * round(sensors.delay / control_period)
+        self._lifts = Lifts(rows, control_period, SENSED)
+        self._model = self._lifts.model(_DAMPING_RATIO)
+        self._waves = WaveFilter(rows, control_period, max(1, round(sensors.depth_error.period / control_period)))
+        self._rope = RopeFilter(rows, WaveBank().rate_noise)
+        self._pulley = FadingPolynomial(rows, HEAVE_MEMORY, control_period)
+        self._turns = np.zeros((round(sensors.delay / control_period), rows))
+        """(steps of delay, N) how far the drums have turned since the moment that the readings speak of, rad."""
+        self._heave_rate, self._drum_angle, self._first_angle, self._depth_error = np.zeros((4, rows))
+
+    def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
+        """Features (n, F) of the first observations (n, K) of these ``rows``, whose past is forgotten."""
+        o = self._lifts.start(cranes, observation, rows)
+        model = self._lifts.model(_DAMPING_RATIO, rows)
+        tension = self._sensors.tension
+        noise = np.maximum(tension.noise, tension.relative_noise * o["load_mass"] * GRAVITY)
+        self._model.replace(rows, model)
+        self._rope.start(model, self._period, self._lifts.stretch_under(noise, o, rows), rows)
+        self._waves.start(rows)
+        self._pulley.start(o["pulley_velocity_z"], rows)
+        self._turns[:, rows] = 0.0
+        self._heave_rate[rows], self._drum_angle[rows] = o["pulley_velocity_z"], o["drum_angle"]
+        self._first_angle[rows], self._depth_error[rows] = o["drum_angle"], 0.0
+        return self._look(o, rows)
+
+    def advance(self, observation: Observation) -> Float32Array:
+        """Features (N, F) of all rows, whose observations (N, K) are one control step later."""
+        o, radius = self._lifts.columns(observation), self._lifts.winch.radius
+        heave_rate, drum_angle = o["pulley_velocity_z"], o["drum_angle"]
+        speed = 0.5 * (heave_rate + self._heave_rate) - radius * (drum_angle - self._drum_angle) / self._period
+        self._heave_rate, self._drum_angle = heave_rate, drum_angle
+        self._pulley.advance(heave_rate)
+        self._waves.advance(heave_rate)
+        self._rope.advance(speed, self._lifts.stretch(o))
+        paid_out = radius * (drum_angle - self._first_angle) + self._rope.stretch
+        self._waves.correct(o["depth_error"] - self._waves.heave() + paid_out)
+        self._depth_error = self._waves.heave() - paid_out
+        return self._look(o, ALL)
+
+    def command(self, share: FloatArray) -> FloatArray:
+        """Drum speed commands (N,) rad/s for shares (N,) of what the winch can change."""
+        command = self._lifts.winch.reach(share)
+        turned = self._lifts.winch.turn(command)
+        self._turns = np.concatenate([self._turns, turned[None]])[1:] if len(self._turns) else self._turns
+        return command
+
+    def _look(self, o: Columns, rows: Rows) -> Float32Array:
+        lifts, step = self._lifts, self._period
+        depth_error, load_velocity, rope_end = self._present()[rows].T
+        rate = self._waves.rate(self._delay + step * np.arange(3.0))[:, rows]
+        soon, later = np.diff(rate, axis=0) / step
+        acceleration, jerk = self._pulley.rate(rows), self._pulley.bend(rows)
+        return _stacked(
+            *_of_the_load(depth_error, load_velocity, rope_end - depth_error),
+            _rope_end_speed(rate[0], lifts, rows),
+            rate[0],
+            acceleration + jerk * (self._delay + 0.5 * step),
+            soon,
+            later,
+            *_of_the_lift(o, lifts, rows),
+        )
+
+    def _present(self) -> FloatArray:
+        """(N, 3) depth error, load's velocity and rope's end, carried over the sensors' delay by the rope's model."""
+        rises = np.diff(self._waves.path(self._period * np.arange(len(self._turns) + 1.0)), axis=0)
+        depth_error, still = self._depth_error, np.zeros_like(self._depth_error)
+        z = np.stack([depth_error, self._rope.load_velocity, depth_error + self._rope.stretch, still], axis=1)
+        for rise, turn in zip(rises, self._turns, strict=True):
+            z[:, 3] = 0.0
+            z = self._model.advance(z, (rise - self._lifts.winch.radius * turn) / self._period)
+        return z[:, :3]
+
+
+Features = StateFeatures | SensedFeatures
+
+
+def features_for(rows: int, control_period: float, sensors: Sensors | None) -> Features:
+    """Features of N rows with these sensors; None where the full state is observed."""
+    return SensedFeatures(rows, control_period, sensors) if sensors else StateFeatures(rows, control_period)
+
+
+def _of_the_load(depth_error: FloatArray, velocity: FloatArray, stretch: FloatArray) -> tuple[FloatArray, ...]:
+    # Beyond some metres only the side of the error: there the agent does what it has learned nearer.
+    return 4.0 * np.tanh(0.5 * depth_error), 2.0 * np.tanh(10.0 * depth_error), 5.0 * velocity, 20.0 * stretch
+
+
+def _rope_end_speed(pulley_velocity: FloatArray, lifts: Lifts, rows: Rows) -> FloatArray:
+    return np.asarray(10.0 * (pulley_velocity - lifts.winch.radius[rows] * lifts.winch.speed[rows]))
+
+
+def _of_the_lift(o: Columns, lifts: Lifts, rows: Rows) -> tuple[FloatArray, ...]:
+    return (
+        0.5 * o["pulley_heave"],
+        o["load_mass"] / 5.0e4 - 1.2,
+        o["rope_length"] / 1.0e3 - 0.8,
+        0.25 * lifts.frequency[rows] - 1.0,
+    )
+
+
+def _stacked(*features: FloatArray) -> Float32Array:
+    return np.asarray(np.clip(np.stack(features, axis=1), -LIMIT, LIMIT), dtype=np.float32)

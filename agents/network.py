@@ -18,11 +18,14 @@ def perceptron(inputs: int, hidden: int) -> nn.Sequential:
 class Actor(nn.Module):
     """Deterministic actor: features (N, inputs) → share of the drum's speed limit (N, 1), in [-1, 1]."""
 
-    def __init__(self, inputs: int, hidden: int) -> None:
+    def __init__(self, inputs: int, hidden: int, *, squashed: bool = False) -> None:
+        """``squashed``: the output passes through tanh instead of being clipped."""
         super().__init__()
+        self.squashed = squashed
         self.perceptron = perceptron(inputs, hidden)
         self.head = nn.Linear(hidden + inputs, 1)
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """Return the action for features x (N, inputs)."""
-        return torch.clamp(self.head(torch.cat([self.perceptron(x), x], dim=-1)), -1.0, 1.0)
+        output = self.head(torch.cat([self.perceptron(x), x], dim=-1))
+        return torch.tanh(output) if self.squashed else torch.clamp(output, -1.0, 1.0)

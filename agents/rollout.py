@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env import task
+from aframe_env.dynamics import layout as at
 from aframe_env.scenario import Scenario, ScenarioDistribution
 from aframe_env.simulation import Simulation
 from agents.policy import FloatArray, Policy
@@ -22,9 +23,13 @@ def held_out_scenarios(distribution: ScenarioDistribution, count: int) -> list[S
     return [distribution.draw(np.random.default_rng([HELD_OUT_SEED, i])) for i in range(count)]
 
 
-@dataclass(frozen=True)
+BAND = 0.05
+"""Depth error that an operator can live with, m: time beyond it is counted."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Episodes:
-    """What came of N episodes."""
+    """What came of N episodes. A row whose rope parts is counted until then, and its free fall in Ω1 and Ω2."""
 
     omega1: FloatArray
     """(N,) ∫ (x_L3 - h)² dt, m² s."""
@@ -32,14 +37,29 @@ class Episodes:
     """(N,) max |x_L3 - h|, m."""
     duration: float
     """s."""
-    slack: npt.NDArray[np.bool_]
-    """(N,) whether the rope was ever slack."""
+    slack_events: npt.NDArray[np.int64]
+    """(N,) how often the rope went slack."""
+    peak_tension: FloatArray
+    """(N,) greatest rope tension, inner steps included, N."""
+    drum_travel: FloatArray
+    """(N,) rope reeled in and out by the drum, m."""
+    peak_power: FloatArray
+    """(N,) greatest power between drum and rope at the control steps, driving or braking, W."""
+    time_outside: FloatArray
+    """(N,) time with a depth error beyond ±BAND, and all that is left after a parted rope, s."""
     parted: npt.NDArray[np.bool_]
     """(N,) whether the rope parted."""
     error: npt.NDArray[np.float32]
     """(N, steps + 1) depth error at the control steps, m."""
     drum_speed: npt.NDArray[np.float32]
     """(N, steps + 1) actual drum speed, rad/s."""
+    tension: npt.NDArray[np.float32]
+    """(N, steps + 1) rope tension, N."""
+
+    @property
+    def slack(self) -> npt.NDArray[np.bool_]:
+        """(N,) whether the rope was ever slack."""
+        return self.slack_events > 0
 
     @property
     def rms(self) -> FloatArray:
@@ -77,20 +97,71 @@ def run(
     simulation.reset_rows(np.arange(rows), list(zip(scenarios, seeds, strict=True)))
     policy.reset(scenarios, control_period)
     steps = simulation.episode_steps
-    error = np.empty((rows, steps + 1), dtype=np.float32)
-    speed = np.empty((rows, steps + 1), dtype=np.float32)
-    slack = np.zeros(rows, dtype=np.bool_)
-    error[:, 0], speed[:, 0] = simulation.state[:, 0], simulation.state[:, 10]
-    alive = np.ones(rows, dtype=np.bool_)
-    omega1, omega2 = np.zeros(rows), np.zeros(rows)
+    tally = _Tally(simulation, scenarios)
     for step in range(steps):
         simulation.advance(policy.act(simulation.observe(), step * control_period))
-        error[:, step + 1], speed[:, step + 1] = simulation.state[:, 0], simulation.state[:, 10]
-        # A row whose rope has parted is over: it was charged for its free fall, and runs on unobserved.
-        omega1 = np.where(alive, simulation.results[:, task.OMEGA1], omega1)
-        omega2 = np.where(alive, simulation.results[:, task.OMEGA2], omega2)
-        slack |= alive & (simulation.results[:, task.SLACK] > 0.0)
-        alive &= simulation.results[:, task.PARTED] == 0.0
+        tally.add()
         if progress is not None:
             progress(step + 1)
-    return Episodes(omega1, omega2, simulation.episode_duration, slack, ~alive, error, speed)
+    return tally.episodes()
+
+
+class _Tally:
+    """The figures of episodes that run in step, control step by control step."""
+
+    def __init__(self, simulation: Simulation, scenarios: Sequence[Scenario]) -> None:
+        rows, steps = simulation.rows, simulation.episode_steps
+        self._simulation = simulation
+        self._radius = np.array([s.crane.winch.drum_radius for s in scenarios])
+        self._histories = np.empty((3, rows, steps + 1), dtype=np.float32)
+        self._step = 0
+        self._alive = np.ones(rows, dtype=np.bool_)
+        self._was_slack = np.zeros(rows, dtype=np.bool_)
+        self._slack_events = np.zeros(rows, dtype=np.int64)
+        self._omega1, self._omega2 = np.zeros(rows), np.zeros(rows)
+        self._peak_tension = simulation.state[:, 11].copy()
+        self._drum_travel, self._peak_power, self._time_outside = np.zeros(rows), np.zeros(rows), np.zeros(rows)
+        self._rope_speed = np.zeros(rows)
+        self._record()
+
+    def _record(self) -> None:
+        self._histories[:, :, self._step] = self._simulation.state[:, (0, 10, 11)].T
+
+    def add(self) -> None:
+        """Count the control step that has just been made."""
+        results, period = self._simulation.results, self._simulation.control_period
+        self._step += 1
+        self._record()
+        error, drum_speed, tension = self._simulation.state[:, (0, 10, 11)].T
+        # A row whose rope has parted is over: it was charged for its free fall, and runs on unobserved.
+        alive = self._alive
+        self._omega1[alive] = results[alive, task.OMEGA1]
+        self._omega2[alive] = results[alive, task.OMEGA2]
+        slack = alive & (results[:, task.SLACK] > 0.0)
+        self._slack_events += slack & ~self._was_slack
+        self._was_slack = slack
+        peak = np.maximum(self._peak_tension, self._simulation.engine.read(at.PEAK_TENSION))
+        self._peak_tension = np.where(alive, peak, self._peak_tension)
+        rope_speed = self._radius * abs(drum_speed)
+        self._drum_travel += alive * 0.5 * period * (rope_speed + self._rope_speed)
+        self._rope_speed = rope_speed
+        self._peak_power = np.maximum(self._peak_power, alive * rope_speed * tension)
+        self._time_outside += period * (~alive | (abs(error) > BAND))
+        self._alive = alive & (results[:, task.PARTED] == 0.0)
+
+    def episodes(self) -> Episodes:
+        """The figures of all episodes."""
+        return Episodes(
+            omega1=self._omega1,
+            omega2=self._omega2,
+            duration=self._simulation.episode_duration,
+            slack_events=self._slack_events,
+            peak_tension=self._peak_tension,
+            drum_travel=self._drum_travel,
+            peak_power=self._peak_power,
+            time_outside=self._time_outside,
+            parted=~self._alive,
+            error=self._histories[0],
+            drum_speed=self._histories[1],
+            tension=self._histories[2],
+        )

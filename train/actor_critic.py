@@ -1,25 +1,75 @@
-"""The agents' networks in Stable-Baselines3's terms, and back."""
+"""The agents' networks in Stable-Baselines3's terms, and back.
+
+A learner's observation is the agent's features, followed, where the agent sees sensors only, by those of the full
+state: the critics see both, the actor the first alone (an asymmetric actor-critic). The critics are not part of the
+agent.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import torch
-from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.policies import ActorCriticPolicy, ContinuousCritic
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.sac.policies import Actor as SACActor
+from stable_baselines3.sac.policies import SACPolicy
 from torch import nn
 
 from agents.network import Actor, perceptron
 
 
-class TwoPathExtractor(nn.Module):
-    """Latents of actor and critic: perceptron's output beside the inputs (and their squares, for the critic)."""
+class ActorLatent(nn.Module):
+    """The perceptron's output beside its inputs, which are the first ones of x."""
 
     def __init__(self, inputs: int, hidden: int) -> None:
         super().__init__()
-        self.actor = perceptron(inputs, hidden)
-        self.critic = perceptron(inputs, hidden)
-        self.latent_dim_pi = hidden + inputs
+        self.inputs = inputs
+        self.perceptron = perceptron(inputs, hidden)
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """Return the latent (N, hidden + inputs)."""
+        x = x[:, : self.inputs]
+        return torch.cat([self.perceptron(x), x], dim=-1)
+
+
+class CriticLatent(nn.Module):
+    """The perceptron's output beside its inputs and their squares."""
+
+    def __init__(self, inputs: int, hidden: int) -> None:
+        super().__init__()
+        self.perceptron = perceptron(inputs, hidden)
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """Return the latent (N, hidden + 2 inputs)."""
+        return torch.cat([self.perceptron(x), x, torch.clamp(x * x, max=10.0)], dim=-1)
+
+
+def _constant(inputs: int, value: float) -> nn.Linear:
+    """A linear layer that begins with the same output whatever its inputs."""
+    layer = nn.Linear(inputs, 1)
+    nn.init.zeros_(layer.weight)
+    nn.init.constant_(layer.bias, value)
+    return layer
+
+
+def actor_of(latent: ActorLatent, head: Mapping[str, torch.Tensor], *, squashed: bool) -> Actor:
+    """The agent's network, from a learner's actor."""
+    actor = Actor(latent.inputs, latent.perceptron[0].out_features, squashed=squashed)  # type: ignore[arg-type]
+    actor.perceptron.load_state_dict(latent.perceptron.state_dict())
+    actor.head.load_state_dict(head)
+    return actor
+
+
+class TwoPathExtractor(nn.Module):
+    """Latents of actor and critic."""
+
+    def __init__(self, inputs: int, actor_inputs: int, hidden: int) -> None:
+        super().__init__()
+        self.actor = ActorLatent(actor_inputs, hidden)
+        self.critic = CriticLatent(inputs, hidden)
+        self.latent_dim_pi = hidden + actor_inputs
         self.latent_dim_vf = hidden + 2 * inputs
 
     def forward(self, x: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -27,16 +77,18 @@ class TwoPathExtractor(nn.Module):
         return self.forward_actor(x), self.forward_critic(x)
 
     def forward_actor(self, x: torch.Tensor) -> torch.Tensor:
-        """Latent of the actor, (N, hidden + inputs)."""
-        return torch.cat([self.actor(x), x], dim=-1)
+        """Latent of the actor."""
+        latent: torch.Tensor = self.actor(x)
+        return latent
 
     def forward_critic(self, x: torch.Tensor) -> torch.Tensor:
-        """Latent of the critic, (N, hidden + 2 inputs)."""
-        return torch.cat([self.critic(x), x, torch.clamp(x * x, max=10.0)], dim=-1)
+        """Latent of the critic."""
+        latent: torch.Tensor = self.critic(x)
+        return latent
 
 
 class TwoPathPolicy(ActorCriticPolicy):
-    """Actor-critic policy on ``TwoPathExtractor``."""
+    """PPO's policy on ``TwoPathExtractor``."""
 
     def __init__(
         self,
@@ -44,23 +96,68 @@ class TwoPathPolicy(ActorCriticPolicy):
         action_space: Any,
         lr_schedule: Callable[[float], float],
         *,
+        actor_inputs: int,
         hidden: int,
         **kwargs: Any,
     ) -> None:
+        self._actor_inputs = actor_inputs
         self._hidden = hidden
         super().__init__(observation_space, action_space, lr_schedule, **kwargs)
 
     def _build_mlp_extractor(self) -> None:
-        self.mlp_extractor = TwoPathExtractor(self.features_dim, self._hidden)  # type: ignore[assignment]
+        self.mlp_extractor = TwoPathExtractor(  # type: ignore[assignment]
+            self.features_dim, self._actor_inputs, self._hidden
+        )
 
     def to_actor(self) -> Actor:
         """Return the mean action as a plain network of its own."""
-        actor = Actor(self.features_dim, self._hidden)
-        own = self.state_dict()
-        actor.load_state_dict(
-            {
-                **{f"perceptron.{k}": own[f"mlp_extractor.actor.{k}"] for k in actor.perceptron.state_dict()},
-                **{f"head.{k}": own[f"action_net.{k}"] for k in actor.head.state_dict()},
-            }
-        )
+        latent = self.mlp_extractor.actor
+        assert isinstance(latent, ActorLatent)
+        return actor_of(latent, self.action_net.state_dict(), squashed=False)
+
+
+class TwoPathSACPolicy(SACPolicy):
+    """SAC's policy: the actor of ``Actor``, critics with a quadratic path."""
+
+    def __init__(
+        self,
+        observation_space: Any,
+        action_space: Any,
+        lr_schedule: Callable[[float], float],
+        *,
+        actor_inputs: int,
+        hidden: int,
+        critic_hidden: int,
+        **kwargs: Any,
+    ) -> None:
+        self._actor_inputs = actor_inputs
+        self._hidden = hidden
+        self._critic_hidden = critic_hidden
+        super().__init__(observation_space, action_space, lr_schedule, **kwargs)
+
+    def make_actor(self, features_extractor: BaseFeaturesExtractor | None = None) -> SACActor:
+        """Return an actor with a linear path; its first standard deviation is the entropy target's or so."""
+        actor = super().make_actor(features_extractor)
+        latent = self._actor_inputs + self._hidden
+        actor.latent_pi = ActorLatent(self._actor_inputs, self._hidden)  # type: ignore[assignment]
+        actor.mu = _constant(latent, 0.0)
+        actor.log_std = _constant(latent, -0.7)  # type: ignore[assignment]
         return actor
+
+    def make_critic(self, features_extractor: BaseFeaturesExtractor | None = None) -> ContinuousCritic:
+        """Return two critics with linear and quadratic paths."""
+        critic = super().make_critic(features_extractor)
+        inputs = critic.features_extractor.features_dim + 1
+        for i in range(critic.n_critics):
+            network = nn.Sequential(
+                CriticLatent(inputs, self._critic_hidden), nn.Linear(self._critic_hidden + 2 * inputs, 1)
+            )
+            critic.q_networks[i] = network
+            setattr(critic, f"qf{i}", network)
+        return critic
+
+    def to_actor(self) -> Actor:
+        """Return the mean action as a plain network of its own."""
+        latent = self.actor.latent_pi
+        assert isinstance(latent, ActorLatent)
+        return actor_of(latent, self.actor.mu.state_dict(), squashed=True)

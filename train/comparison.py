@@ -65,6 +65,18 @@ class Row:
     """Scenarios in which the policy is worse than the drum still."""
     parted: int
     """Scenarios in which the rope parted."""
+    slack: int
+    """Scenarios in which the rope went slack."""
+    slack_events: int
+    """Over all scenarios."""
+    peak_tension: Interval
+    """N."""
+    drum_travel: Interval
+    """m of rope, reeled in and out."""
+    peak_power: Interval
+    """W."""
+    time_outside: Interval
+    """Share of the time with a depth error beyond ±5 cm."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +98,7 @@ def compare(entries: Sequence[Entry], still: Episodes) -> list[Row]:
     """Figures of every policy."""
     rows = []
     for entry in entries:
+        episodes = entry.episodes
         reduction = reductions(entry, still)
         rows.append(
             Row(
@@ -93,12 +106,18 @@ def compare(entries: Sequence[Entry], still: Episodes) -> list[Row]:
                 knows=entry.knows.value,
                 scenarios=len(reduction),
                 reduction=Interval.of(reduction),
-                rms=Interval.of(entry.episodes.rms),
-                omega1=Interval.of(entry.episodes.omega1),
-                omega2=Interval.of(entry.episodes.omega2),
+                rms=Interval.of(episodes.rms),
+                omega1=Interval.of(episodes.omega1),
+                omega2=Interval.of(episodes.omega2),
                 worst_reduction=float(reduction.min()),
                 worse_than_still=int((reduction < 0.0).sum()),
-                parted=int(entry.episodes.parted.sum()),
+                parted=int(episodes.parted.sum()),
+                slack=int(episodes.slack.sum()),
+                slack_events=int(episodes.slack_events.sum()),
+                peak_tension=Interval.of(episodes.peak_tension),
+                drum_travel=Interval.of(episodes.drum_travel),
+                peak_power=Interval.of(episodes.peak_power),
+                time_outside=Interval.of(episodes.time_outside / episodes.duration),
             )
         )
     return rows

@@ -1,6 +1,8 @@
-"""Compare a trained agent with the drives on held-out scenarios: ``python -m train.evaluate --agent results/ppo``.
+"""Compare policies on the same held-out scenarios: ``python -m train.evaluate --policies results/ppo S-Ω1``.
 
-The same comparison as at the end of a training, on the simplified or the full model.
+A policy is a name ("S-Ω1", or s-omega1 on a keyboard without Ω), the folder of an agent, or module:function for your
+own: see ``agents.catalogue``. The drum left alone is always there as the yardstick. Writes the table (Markdown, JSON,
+PNG) and every episode (CSV, Parquet).
 """
 
 from __future__ import annotations
@@ -9,53 +11,53 @@ import shlex
 import sys
 from dataclasses import dataclass
 from datetime import datetime
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Literal
 
 from rich.console import Console
 
-from aframe_env.flexible_engine import mesh_of
-from aframe_env.validation import require_integer
-from agents.drive_map import load as load_map
-from agents.learned import load
+from aframe_env.validation import InvalidValue
+from agents.catalogue import choose_all
 from train.config import parse, to_toml
-from train.held_out import evaluate
+from train.held_out import AFTER_TRAINING, HeldOut, run_all, write
 from train.output import new_folder, user_errors, versions, write_json, write_text
 
+REPORT_PACKAGES = ("pyarrow",)
 
-@dataclass(frozen=True)
-class Options:
-    """Which agent, on what."""
 
-    agent: Path = Path("results/ppo")
-    """Folder of the agent."""
-    model: Literal["simplified", "rfem"] = "simplified"
-    """Model that the policies run on; drives are optimised on the simplified one."""
-    rfem_modes: int | None = None
-    """With rfem, the number of natural modes to keep; all by default."""
-    scenarios: int = 200
-    """Held-out scenarios."""
-    privileged: int = 20
-    """The first so many of them for the drives that are optimised with the whole future known."""
-    drive_map: Path | None = None
-    """Folder of a drive map, such as results/drive-map, to run as well."""
+@dataclass(frozen=True, kw_only=True)
+class Options(HeldOut):
+    """Which policies, on what."""
+
+    policies: tuple[str, ...] = (
+        "results/ppo",
+        "results/drive-map",
+        *AFTER_TRAINING,
+        "predictive control",
+        "inverse dynamics",
+    )
+    """Names, folders of agents, or module:function."""
+    report: bool = True
+    """Write episodes.parquet too (extra "report")."""
     out: Path | None = None
     """Output folder; by default runs/evaluate-DATE-TIME."""
     overwrite: bool = False
     """Write into the output folder even if it has something in it."""
 
     def __post_init__(self) -> None:
-        mesh_of(self.model, None, self.rfem_modes)
-        require_integer("scenarios", self.scenarios, low=1, high=10**6)
-        require_integer("privileged", self.privileged, low=0, high=self.scenarios)
+        super().__post_init__()
+        missing = [name for name in REPORT_PACKAGES if find_spec(name) is None]
+        if self.report and missing:
+            raise InvalidValue(
+                f"report = True: needs {', '.join(missing)}; pip install 'aframe-heave[report]', or pass --no-report"
+            )
 
 
 def main() -> int:
     """Run the command."""
     with user_errors():
         options, console = parse(Options, __doc__ or ""), Console()
-        policy = load(options.agent)
-        stored = None if options.drive_map is None else load_map(options.drive_map)
+        choices = choose_all(options.policies)
         folder = new_folder(
             options.out or Path("runs") / f"evaluate-{datetime.now():%Y%m%d-%H%M%S}", overwrite=options.overwrite
         )
@@ -63,18 +65,16 @@ def main() -> int:
         command = shlex.join(["python", "-m", "train.evaluate", *sys.argv[1:]])
         write_json(folder / "run.json", {"command": command, "versions": versions()})
         try:
-            evaluate(
-                policy,
-                folder,
-                options.scenarios,
-                options.privileged,
-                console,
-                model=options.model,
-                rfem_modes=options.rfem_modes,
-                drive_map=stored,
-            )
+            comparison = run_all(choices, options, console)
+            write(folder, comparison, console)
+            if options.report:
+                # Imported late: they need the extra.
+                from train.episode_table import write_episodes
+
+                write_episodes(folder / "episodes.parquet", comparison)
+                console.print(f"every episode: {folder / 'episodes.parquet'}")
         except KeyboardInterrupt:
-            console.print("interrupted: no comparison was written")
+            console.print("interrupted: the comparison is not complete")
             return 130
     return 0
 

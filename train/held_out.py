@@ -1,72 +1,135 @@
-"""The comparison at the end of a training: the agent against the drum still and the paper's drives."""
+"""Policies side by side on the same held-out scenarios, with the same noise: the run behind every comparison."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
+from typing import Final, Literal
 
 from rich.console import Console
-from rich.progress import Progress
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from aframe_env import task
-from aframe_env.scenario import ScenarioDistribution
-from agents.drive_map import DriveMap
-from agents.drive_map_policy import DriveMapPolicy
-from agents.drive_policy import DrivePolicy
-from agents.policy import DrumStill, Knowledge, Policy
-from agents.rollout import held_out_scenarios, run
-from train.comparison import Entry, compare, rich_table, write_comparison
+from aframe_env.flexible_engine import mesh_of
+from aframe_env.scenario import Scenario, ScenarioDistribution
+from aframe_env.validation import require_integer
+from agents.catalogue import DRUM_STILL, Choice, Setting, as_choice, choose_all
+from agents.policy import Knowledge, Policy
+from agents.rollout import Episodes, held_out_scenarios, run
+from agents.tuned_drives import TUNED
+from train.comparison import Entry, Row, compare, rich_table, write_comparison
 from train.figures import comparison_figure
-from train.tuned_drives import DURATION, TUNED, tune
+from train.tasks import run_tasks
+from train.tuned_drives import DURATION
 
-FOR_EACH = ("S-Ω1", "H-Ω1")
-"""Drives that are optimised once more for each of the first scenarios."""
+CONTROL_PERIOD: Final = 0.1
+AFTER_TRAINING: Final = (
+    *TUNED,
+    "feed-forward + feedback (state)",
+    "feed-forward + feedback",
+    "S-Ω1 for each scenario",
+    "H-Ω1 for each scenario",
+)
+"""What an agent is compared with at the end of its training."""
 
 
-def evaluate(
-    policy: Policy,
-    folder: Path,
-    count: int,
-    privileged: int,
-    console: Console,
-    *,
-    model: str = "simplified",
-    rfem_modes: int | None = None,
-    drive_map: DriveMap | None = None,
-) -> None:
-    """Run every policy over ``count`` held-out scenarios and write the comparison into ``folder``.
+@dataclass(frozen=True, kw_only=True)
+class HeldOut:
+    """On what policies are compared."""
 
-    The drives of the first ``privileged`` scenarios are optimised once more with the scenario's future known; always
-    on the simplified model, whatever the ``model`` that the policies then run on.
-    """
+    scenarios: int = 200
+    """Held-out scenarios: the first so many of a series that training never draws from."""
+    privileged: int = 20
+    """The first so many of them for the drives that are optimised for each scenario, its whole future known."""
+    observation: Literal["state", "sensors"] = "state"
+    """What a policy sees that is not made for either; an agent sees what it was trained on."""
+    model: Literal["simplified", "rfem"] = "simplified"
+    """Model that the policies run on; drives are optimised on the simplified one."""
+    rfem_modes: int | None = None
+    """With rfem, the number of natural modes to keep; all by default."""
+
+    def __post_init__(self) -> None:
+        mesh_of(self.model, None, self.rfem_modes)
+        require_integer("scenarios", self.scenarios, low=1, high=20_000)
+        require_integer("privileged", self.privileged, low=0, high=self.scenarios)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Policies side by side; the first one is the drum still."""
+
+    entries: tuple[Entry, ...]
+    scenarios: tuple[Scenario, ...]
+    held_out: HeldOut
+
+    @property
+    def still(self) -> Episodes:
+        """The yardstick: the drum left alone."""
+        return self.entries[0].episodes
+
+    @cached_property
+    def rows(self) -> list[Row]:
+        """Every policy's figures."""
+        return compare(self.entries, self.still)
+
+
+def run_all(choices: Sequence[Choice], held_out: HeldOut, console: Console) -> Comparison:
+    """Run the drum still and every policy that was chosen over the held-out scenarios."""
     distribution = ScenarioDistribution()
-    scenarios = held_out_scenarios(distribution, count)
-    observation: task.Observation = "state" if policy.knows is Knowledge.STATE else "sensors"
-    with Progress(console=console) as progress:
-        nominal = tune(tuple(TUNED), [distribution.nominal()], progress=progress)
-        known = tune(FOR_EACH, scenarios[:privileged], progress=progress) if privileged else {}
-        policies: list[Policy] = [DrumStill(), policy]
-        for name, drives in nominal.items():
-            policies.append(DrivePolicy(name=name, drives=drives * count))
-        if drive_map is not None:
-            policies.append(DriveMapPolicy(drive_map, duration=DURATION))
-        for name, drives in known.items():
-            policies.append(DrivePolicy(name=f"{name} for each scenario", drives=drives, knows=Knowledge.FUTURE))
-        entries = []
-        for each in policies:
-            bar = progress.add_task(each.name, total=round(DURATION / 0.1))
+    scenarios = held_out_scenarios(distribution, held_out.scenarios)
+    first = scenarios[: held_out.privileged]
+    entries = []
+    with Progress(
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
+    ) as progress:
+        for choice in (DRUM_STILL, *(c for c in choices if c.name != DRUM_STILL.name)):
+            mine = first if choice.for_each_scenario else scenarios
+            if not mine:
+                continue
+            policy = choice.build(
+                Setting(
+                    scenarios=mine,
+                    nominal=distribution.nominal(),
+                    episode_duration=DURATION,
+                    observation=held_out.observation,
+                    spread=partial(run_tasks, progress=progress, description=f"{choice.name}: preparing"),
+                )
+            )
+            bar = progress.add_task(choice.name, total=round(DURATION / CONTROL_PERIOD))
             episodes = run(
-                each,
-                scenarios[:privileged] if each.knows is Knowledge.FUTURE else scenarios,
-                observation=observation,
+                policy,
+                mine,
+                observation=_observation(policy, held_out),
+                control_period=CONTROL_PERIOD,
                 episode_duration=DURATION,
-                model=model,
-                rfem_modes=rfem_modes,
+                model=held_out.model,
+                rfem_modes=held_out.rfem_modes,
                 progress=lambda step, bar=bar: progress.update(bar, completed=step),  # type: ignore[misc]
             )
-            entries.append(Entry(each.name, each.knows, episodes))
-    still = entries[0].episodes
-    rows = compare(entries, still)
-    console.print(rich_table(rows))
-    write_comparison(folder, rows, entries)
-    comparison_figure(folder / "comparison.png", entries, still)
+            entries.append(Entry(choice.name, policy.knows, episodes))
+    return Comparison(tuple(entries), tuple(scenarios), held_out)
+
+
+def _observation(policy: Policy, held_out: HeldOut) -> task.Observation:
+    seen: dict[Knowledge, task.Observation] = {
+        Knowledge.STATE: "state",
+        Knowledge.FUTURE: "state",
+        Knowledge.SENSORS: "sensors",
+    }
+    return seen.get(policy.knows, held_out.observation)
+
+
+def write(folder: Path, comparison: Comparison, console: Console) -> None:
+    """Write figures, table and picture of a comparison into a folder, and print the table."""
+    console.print(rich_table(comparison.rows))
+    write_comparison(folder, comparison.rows, comparison.entries)
+    comparison_figure(folder / "comparison.png", comparison.entries, comparison.still)
     console.print(f"comparison: {folder / 'comparison.md'}, {folder / 'comparison.png'}")
+
+
+def evaluate(policy: Policy, folder: Path, count: int, privileged: int, console: Console) -> None:
+    """Compare an agent with the drum still and the paper's drives, and write the comparison into ``folder``."""
+    held_out = HeldOut(scenarios=count, privileged=privileged)
+    write(folder, run_all([as_choice(policy), *choose_all(AFTER_TRAINING)], held_out, console), console)

@@ -25,13 +25,14 @@ from agents.drive_policy import DrivePolicy
 from agents.optimisation import OPTIMISERS, OptimisedDrive, Optimiser
 from agents.policy import DrumStill, FloatArray, Knowledge, Policy
 from agents.rollout import held_out_scenarios, run
+from agents.tuned_drives import TUNED
 from train.config import parse, to_toml
 from train.output import new_folder, user_errors, versions, write_json, write_text
 from train.sensitivity_study.analysis import Sensitivity, analyse
 from train.sensitivity_study.factors import FACTORS
 from train.sensitivity_study.figures import draw_curves, draw_indices
 from train.tasks import run_tasks
-from train.tuned_drives import TUNED, tune
+from train.tuned_drives import tune
 
 STILL, MAP = "drum still", "drive map"
 

@@ -1,4 +1,4 @@
-"""The source's four drives, S-Ω1, S-Ω2, H-Ω1 and H-Ω2, for any number of scenarios."""
+"""The source's four drives for any number of scenarios, found in parallel."""
 
 from __future__ import annotations
 
@@ -9,27 +9,11 @@ from typing import Final
 from rich.progress import Progress
 
 from aframe_env.scenario import Scenario
-from agents.optimisation import Family, ObjectiveName, OptimisedDrive, Optimiser, optimise
+from agents.optimisation import OptimisedDrive, Optimiser
+from agents.tuned_drives import TUNED, optimised
 from train.tasks import run_tasks
 
 DURATION: Final = 60.0
-
-
-@dataclass(frozen=True)
-class Tuned:
-    """A family of drives, tuned for an objective."""
-
-    family: Family
-    objective: ObjectiveName
-
-
-TUNED: Final[dict[str, Tuned]] = {
-    "S-Ω1": Tuned("spline", "omega1"),
-    "S-Ω2": Tuned("spline", "omega2"),
-    "H-Ω1": Tuned("harmonic", "omega1"),
-    "H-Ω2": Tuned("harmonic", "omega2"),
-}
-"""By the source's names."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +24,7 @@ class _Task:
 
 
 def _solve(task: _Task) -> OptimisedDrive:
-    tuned = TUNED[task.name]
-    return optimise(tuned.family, task.scenario, tuned.objective, DURATION, optimiser=task.optimiser)
+    return optimised(TUNED[task.name], DURATION, task.scenario, task.optimiser)
 
 
 def tune(

@@ -8,7 +8,7 @@ from aframe_env import InvalidValue, ScenarioDistribution
 from aframe_env.env import AFrameHeaveEnv
 from aframe_env.sensors import Sensors
 from aframe_env.task import SENSED, STATE
-from agents.features import feature_names, features
+from agents.features import FeatureMaker, feature_names
 from agents.learned import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, load, serialise
 from agents.network import Actor
 from agents.policy import Knowledge
@@ -95,6 +95,18 @@ def test_another_control_period_is_refused():
         policy.reset([], 0.2)
 
 
+def test_an_agent_on_sensors_remembers_until_its_episode_ends():
+    policy, _ = agent("sensors")
+    env = AFrameHeaveEnv(observation="sensors", scenario=ScenarioDistribution(hs=4.0))
+    first, _ = env.reset(seed=0)
+    begun = policy.predict(first, first=True)
+    for _ in range(30):
+        observed = env.step(np.zeros(1, dtype=np.float32))[0]
+        remembering = policy.predict(observed)
+    assert remembering != policy.predict(observed, first=True)
+    assert policy.predict(first, first=True) == begun
+
+
 def test_an_agent_acts_alike_alone_and_in_a_batch():
     policy, _ = agent()
     scenarios = held_out_scenarios(ScenarioDistribution(), 3)
@@ -110,9 +122,11 @@ def test_features_are_of_order_one_over_the_distribution():
         seen = []
         for seed in range(12):
             observed, _ = env.reset(seed=seed)
+            maker = FeatureMaker(quantities, 1, 0.1)
+            maker.start(observed[None], np.array([0]))
             for _ in range(200):
-                observed = env.step(np.zeros(1, dtype=np.float32))[0]
-            seen.append(features(observed[None], quantities)[0])
+                found = maker.advance(env.step(np.zeros(1, dtype=np.float32))[0][None])
+            seen.append(found[0])
         spread = np.abs(np.array(seen)).max(axis=0)
         names = feature_names(quantities)
         moving = [i for i, name in enumerate(names) if name != "drum_speed"]

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -6,9 +8,9 @@ from stable_baselines3.common.vec_env import VecEnv
 from aframe_env import ScenarioDistribution
 from aframe_env.env import AFrameHeaveEnv
 from aframe_env.task import STATE
-from agents.features import features
+from agents.features import STATE_FEATURES, FeatureMaker
+from train import ppo, sac
 from train.bridge import TrainingVecEnv
-from train.ppo import Options, build
 
 
 def bridge(rows=3, **changes):
@@ -26,6 +28,10 @@ def bridge(rows=3, **changes):
     return TrainingVecEnv(rows, **arguments)
 
 
+def state_features(observation):
+    return FeatureMaker(STATE, 1, 0.1).start(observation[None], np.array([0]))[0]
+
+
 def test_rows_are_the_environments():
     rows = bridge(horizon=60.0)
     observed = rows.reset()
@@ -33,7 +39,7 @@ def test_rows_are_the_environments():
     for i, scenario in enumerate(rows._simulation.scenarios):
         env = AFrameHeaveEnv(scenario=scenario)
         first, _ = env.reset(seed=0)
-        np.testing.assert_array_equal(features(first[None], STATE)[0], observed[i])
+        np.testing.assert_array_equal(state_features(first), observed[i])
         envs.append(env)
     actions = np.array([[0.1], [-0.2], [0.0]], dtype=np.float32)
     for _ in range(8):
@@ -41,7 +47,7 @@ def test_rows_are_the_environments():
         assert not finished.any()
         for i, env in enumerate(envs):
             want, reward, _, _, _ = env.step(np.array([4.0 * float(actions[i, 0])], dtype=np.float32))
-            np.testing.assert_allclose(observed[i], features(want[None], STATE)[0], atol=2e-5)
+            np.testing.assert_allclose(observed[i], state_features(want), atol=2e-5)
             # The reward is the root mean square over the step, in place of the mean square.
             assert rewards[i] == pytest.approx(-np.sqrt(-reward / 0.1), rel=1e-4, abs=1e-6)
 
@@ -75,17 +81,41 @@ def test_a_drifting_row_starts_anew():
 
 def test_it_is_a_vec_env_that_learners_accept():
     assert isinstance(bridge(), VecEnv)
-    model, _ = build(Options(n_envs=4, n_steps=8, batch_size=16, n_epochs=1))
+    model = ppo.build(ppo.Options(n_envs=4, n_steps=8, batch_size=16, n_epochs=1)).model
     before = {k: v.clone() for k, v in model.policy.state_dict().items()}
     model.learn(64)
     after = model.policy.state_dict()
     assert any(not torch.equal(before[k], after[k]) for k in before)
 
 
-def test_the_plain_actor_is_the_learners_mean_action():
-    model, rows = build(Options(n_envs=4, n_steps=8, batch_size=16))
-    observed = rows.reset()
-    want, _ = model.predict(observed, deterministic=True)
+@pytest.mark.parametrize("observation", ["state", "sensors"])
+@pytest.mark.parametrize(
+    ("build", "options"),
+    [
+        (ppo.build, ppo.Options(n_envs=4, n_steps=8, batch_size=16, n_epochs=1)),
+        (sac.build, sac.Options(n_envs=4, batch_size=16, learning_starts=8)),
+    ],
+    ids=["ppo", "sac"],
+)
+def test_the_plain_actor_is_the_learners_mean_action(build, options, observation):
+    learner = build(replace(options, observation=observation))
+    learner.model.learn(64)
+    observed = learner.rows.reset()
+    want, _ = learner.model.predict(observed, deterministic=True)
     with torch.no_grad():
-        got = model.policy.to_actor()(torch.from_numpy(observed))
+        got = learner.to_actor()(torch.from_numpy(observed[:, : learner.rows.actor_inputs]))
+    assert np.abs(want).max() > 1e-4
     np.testing.assert_allclose(got.numpy(), want, atol=1e-6)
+
+
+def test_what_the_critics_see_beyond_the_sensors_does_not_move_the_agent():
+    learner = ppo.build(ppo.Options(n_envs=4, n_steps=8, batch_size=16, observation="sensors"))
+    observed = learner.rows.reset()
+    other = observed.copy()
+    other[:, learner.rows.actor_inputs :] += 1.0
+    policy = learner.model.policy
+    assert observed.shape[1] == learner.rows.actor_inputs + len(STATE_FEATURES)
+    with torch.no_grad():
+        values = [policy.predict_values(torch.from_numpy(x)) for x in (observed, other)]
+    np.testing.assert_array_equal(*[learner.model.predict(x, deterministic=True)[0] for x in (observed, other)])
+    assert not torch.equal(*values)

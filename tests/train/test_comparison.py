@@ -15,10 +15,15 @@ def episodes(omega1):
         omega1=np.array(omega1),
         omega2=np.full(count, 0.5),
         duration=60.0,
-        slack=np.zeros(count, dtype=bool),
+        slack_events=np.zeros(count, dtype=np.int64),
+        peak_tension=np.full(count, 1e6),
+        drum_travel=np.zeros(count),
+        peak_power=np.zeros(count),
+        time_outside=np.full(count, 30.0),
         parted=np.zeros(count, dtype=bool),
         error=np.zeros((count, 2), dtype=np.float32),
         drum_speed=np.zeros((count, 2), dtype=np.float32),
+        tension=np.full((count, 2), 1e6, dtype=np.float32),
     )
 
 

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 
+from agents.tuned_drives import TUNED
 from train import evaluate
 
 RESULTS = Path(__file__).parents[2] / "results"
@@ -17,22 +18,22 @@ def command(monkeypatch, *arguments):
 @pytest.mark.parametrize("model", ["simplified", "rfem"])
 def test_the_committed_agent_is_as_good_as_the_results_say(model, tmp_path, monkeypatch):
     out = tmp_path / "out"
-    few = ("--scenarios", 12, "--privileged", 0, "--drive-map", MAP)
-    assert command(monkeypatch, "--agent", AGENT, "--model", model, *few, "--out", out) == 0
+    few = ("--scenarios", 12, "--privileged", 0, "--no-report", "--out", out)
+    assert command(monkeypatch, "--policies", AGENT, MAP, *TUNED, "--model", model, *few) == 0
     rows = {row["policy"]: row for row in json.loads((out / "comparison.json").read_text(encoding="utf-8"))}
     assert rows["PPO"]["reduction"]["median"] > 0.95
     assert rows["PPO"]["worse_than_still"] == 0
     assert {"S-Ω1", "S-Ω2", "H-Ω1", "H-Ω2", "drive map"} <= set(rows)
     assert all(row["knows"] == "clock" for name, row in rows.items() if name not in ("PPO", "drum still"))
-    assert json.loads((out / "run.json").read_text())["command"].startswith("python -m train.evaluate --agent")
+    assert json.loads((out / "run.json").read_text())["command"].startswith("python -m train.evaluate --policies")
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--agent", "absent"), "no agent in 'absent'"),
-        (("--agent", AGENT, "--scenarios", 0), "scenarios = 0: must be in [1, 1000000]"),
-        (("--agent", AGENT, "--rfem-modes", 5), "rfem_modes"),
+        (("--policies", "absent"), "policy = 'absent': must be one of 'drum still'"),
+        (("--scenarios", 0), "scenarios = 0: must be in [1, 20000]"),
+        (("--rfem-modes", 5), "rfem_modes"),
     ],
 )
 def test_bad_options_are_one_clear_line(arguments, words, tmp_path, monkeypatch, capsys):
