@@ -23,7 +23,7 @@ check: .venv/installed-test
 	$(BIN)/mypy
 
 bench: .venv/installed-test .venv-peers/installed
-	$(BIN)/python -m benchmarks.engine $(ARGS)
+	$(BIN)/python -m benchmarks $(ARGS)
 	$(BIN)/python -m benchmarks.rfem
 	$(BIN)/python -m benchmarks.rfem_peer --peer-python .venv-peers/bin/python
 
@@ -42,7 +42,7 @@ bench: .venv/installed-test .venv-peers/installed
 
 .venv-peers/installed: benchmarks/peers.txt | .venv/bin/python
 	$(PYTHON) -m venv .venv-peers
-	.venv-peers/bin/python -m pip install --disable-pip-version-check -q -r benchmarks/peers.txt
+	.venv-peers/bin/python benchmarks/peers/install.py benchmarks/peers.txt
 	touch $@
 
 clean:

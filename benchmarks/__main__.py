@@ -7,6 +7,7 @@ An interrupted run keeps what it has: ``--resume`` goes on with it.
 from __future__ import annotations
 
 import shlex
+import signal
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +21,7 @@ from rich.table import Table
 from aframe_env.validation import InvalidValue, require_integer
 from benchmarks.catalogue import MEASURES, Measure, Script, matching
 from benchmarks.limit.library import NoCompiler, compiler_version
-from benchmarks.report import HEADINGS, write_report
+from benchmarks.report import write_report
 from benchmarks.results import Machine, Run, Series
 from benchmarks.workers import NotMeasured, Pythons, Worker
 from train.config import parse
@@ -33,7 +34,7 @@ QUICK_ROUNDS: Final = 2
 class Options:
     """What to measure, and how often."""
 
-    rounds: int = 7
+    rounds: int = 5
     """Samples of each measure, taken in turn."""
     quick: bool = False
     """Two rounds, for trying."""
@@ -155,12 +156,10 @@ def run(options: Options, console: Console) -> int:
         measuring.close()
     rows = write_report(folder, measured)
     partial.unlink(missing_ok=True)
-    table = Table(box=SIMPLE, padding=0)
-    for heading in HEADINGS:
-        table.add_column(heading)
+    table = Table("bar", "", "measured", "ratio", "met", box=SIMPLE, padding=0)
     for row in rows:
         met = {True: "yes", False: "no", None: "-"}[row.met]
-        table.add_row(row.what, row.bar, row.measured, row.peer, row.ratio, met)
+        table.add_row(row.what, row.bar, row.measured, row.ratio, met)
     console.print(table)
     console.print(f"written: {folder / 'benchmarks.md'}")
     return 0
@@ -168,6 +167,7 @@ def run(options: Options, console: Console) -> int:
 
 def main() -> int:
     """Run the command."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     with user_errors():
         return run(parse(Options, __doc__ or ""), Console())
 

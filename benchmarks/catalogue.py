@@ -69,14 +69,10 @@ def _speeds() -> Iterator[Measure]:
             cores,
             ENVIRONMENTS,
             "vector environment, whole episodes with autoreset, 4096 rows",
-            rounds=5 if cores == 1 else None,
+            rounds=3,
         )
-    yield Measure(
-        "env", "episodes-64", 2, ENVIRONMENTS, "vector environment, whole episodes with autoreset, 64 rows", rounds=5
-    )
-    yield Measure(
-        "env", "episodes-4096-default", 2, ENVIRONMENTS, "the same, 4096 rows, inner step as by default", rounds=5
-    )
+    yield Measure("env", "episodes-64", 2, ENVIRONMENTS, "the same, 64 rows", rounds=3)
+    yield Measure("env", "episodes-4096-default", 2, ENVIRONMENTS, "the same, 4096 rows, default inner step", rounds=3)
     yield Measure("env", "scalar", 1, ENVIRONMENTS, "env.step through gymnasium.make, resets included")
     yield Measure("env", "scalar-default", 1, ENVIRONMENTS, "the same, inner step as by default")
     yield Measure("dynamics", "one-row", 1, DYNAMICS, "Engine.step, 32 wave components, one row")
@@ -102,20 +98,20 @@ def _others() -> Iterator[Measure]:
     yield Measure("limit", "deviation", 1, LIMIT, "load of the C++ limit against the package's, 60 s", "m", 1)
     yield Measure("drives", "omega1-alone", 1, DRIVES, "one evaluation of Ω1, paper's case, 36 s", "µs")
     yield Measure("drives", "omega1-filled", 1, DRIVES, "each of 64 evaluations of Ω1 together", "µs")
-    yield Measure("drives", "omega1-step", 1, DRIVES, "inner step of these (largest with Ω1 right to 1e-4)", "ms", 1)
-    yield Measure("drives", "paper-table", 2, DRIVES, "python -m train.drives --case paper", "s", 3)
+    yield Measure("drives", "omega1-error", 1, DRIVES, "relative error of Ω1 at the inner step of these", "", 1)
+    yield Measure("drives", "paper-table", 2, DRIVES, "python -m train.drives --case paper", "s", 1)
     memory = "a row of the vector environment, 65,536 rows, drawn seas, over an autoreset"
     yield Measure("env", "memory-peak", 2, ENVIRONMENTS, f"memory of {memory}, at its most", "KiB", 1)
-    yield Measure("startup", "import", 1, STARTUP, "import aframe_env, no torch in it", "s", 5)
-    yield Measure("startup", "warm", 1, STARTUP, "make and first reset, warm compile cache", "s", 5)
-    yield Measure("startup", "warm-vector", 1, STARTUP, "the same, vector environment", "s", 5)
-    yield Measure("startup", "cold", 1, STARTUP, "make and first reset, nothing compiled", "s", 3)
-    yield Measure("startup", "cold-vector", 1, STARTUP, "the same, vector environment", "s", 3)
+    yield Measure("startup", "cold", 1, STARTUP, "make and first reset, nothing compiled", "s", 1)
+    yield Measure("startup", "cold-vector", 1, STARTUP, "the same, vector environment", "s", 1)
+    yield Measure("startup", "import", 1, STARTUP, "import aframe_env, no torch in it", "s")
+    yield Measure("startup", "warm", 1, STARTUP, "make and first reset, warm compile cache", "s")
+    yield Measure("startup", "warm-vector", 1, STARTUP, "the same, vector environment", "s")
     for rows in COST_ROWS:
-        yield Measure("cost", f"engine-{rows}", 2, ENVIRONMENTS, f"Engine.step, {rows:,} rows", rounds=5)
+        yield Measure("cost", f"engine-{rows}", 2, ENVIRONMENTS, f"Engine.step, {rows:,} rows", rounds=3)
     for rows in COST_ROWS:
         yield Measure(
-            "cost", f"env-{rows}", 2, ENVIRONMENTS, f"vector environment within episodes, {rows:,} rows", rounds=5
+            "cost", f"env-{rows}", 2, ENVIRONMENTS, f"vector environment within episodes, {rows:,} rows", rounds=3
         )
 
 

@@ -68,11 +68,7 @@ def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def write_report(folder: Path, run: Run) -> list[Verdict]:
     """Write all three; return the verdicts."""
     rows = verdicts(run)
-    path = folder / "benchmarks.json"
-    run.save(path)
-    import json
-
-    write_json(path, {"bars": [asdict(row) for row in rows], **json.loads(path.read_text(encoding="utf-8"))})
+    write_json(folder / "benchmarks.json", {"bars": [asdict(row) for row in rows], **run.data()})
     write_text(folder / "benchmarks.md", markdown(run, rows))
     draw(folder / "benchmarks.png", run)
     return rows

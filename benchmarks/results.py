@@ -8,10 +8,13 @@ import platform
 import statistics
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any, Final
 
 from aframe_env.structuring import strict_converter, structure
 from aframe_env.validation import InvalidValue
 from train.output import versions, write_json
+
+NOT_ASKED: Final = "not measured in this run"
 
 
 @dataclass
@@ -80,11 +83,15 @@ class Run:
 
     def get(self, key: str) -> Series:
         """Series of a measure; an empty one if it was not asked for."""
-        return self.series.get(key, Series(error="not measured in this run"))
+        return self.series.get(key, Series(error=NOT_ASKED))
+
+    def data(self) -> dict[str, Any]:
+        """As plain data."""
+        return dict(strict_converter().unstructure(self))
 
     def save(self, path: Path) -> None:
         """Write the samples, all or nothing."""
-        write_json(path, strict_converter().unstructure(self))
+        write_json(path, self.data())
 
     @classmethod
     def load(cls, path: Path) -> Run:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import select
@@ -61,7 +62,7 @@ class Worker:
         allowed = available_cores()
         if allowed and len(allowed) < cores:
             raise NotMeasured(f"needs {cores} cores, there are {len(allowed)}")
-        self._errors = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")
+        self._errors = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115
         environment = {**os.environ, **dict.fromkeys(THREADS, str(cores)), "PYTHONUNBUFFERED": "1"}
         if script.interpreter == "peers":
             environment.pop("PYTHONPATH", None)
@@ -104,12 +105,11 @@ class Worker:
 
     def close(self) -> None:
         """End the process."""
-        assert self._process.stdin is not None and self._process.stdout is not None
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
         self._process.stdout.close()
-        try:
+        with contextlib.suppress(OSError):
             self._process.stdin.close()
-        except OSError:
-            pass
         try:
             self._process.wait(timeout=2.0)
         except subprocess.TimeoutExpired:

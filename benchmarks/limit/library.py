@@ -113,6 +113,7 @@ class Limit:
 
     def step(self, commands: npt.NDArray[Any]) -> None:
         """One control step with the drum speed commands (rows,) rad/s, of the limit's own dtype."""
-        assert commands.dtype == self._blocks.dtype and commands.shape == (self.rows,)
+        assert commands.dtype == self._blocks.dtype
+        assert commands.shape == (self.rows,)
         blocks, *rest = self._rest
         self._step(self._blocks.ctypes.data, commands.ctypes.data, blocks, *rest)

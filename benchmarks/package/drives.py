@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from agents.drives import spline_matrices
-from agents.objectives import Objective
+from agents.objectives import Objective, coarse_step
 from agents.optimisation import required_angle
 from benchmarks.peers.serve import Measurement, serve, speed
 from train.drives import paper_case
@@ -24,35 +24,30 @@ FloatArray = npt.NDArray[np.float64]
 
 DURATION: Final = 36.0
 INTERVALS: Final = 18
-RIGHT_TO: Final = 1e-4
-"""Relative error of Ω1 that an inner step may make."""
-STEPS: Final = (0.2, 0.15, 0.12, 0.1, 0.09, 0.08, 0.075, 0.06, 0.05, 0.04, 0.03, 0.02, 0.01)
 FINE: Final = 0.002
+"""Inner step of the exact Ω1, s."""
 LANES: Final = 64
-
-
-def drives(objective: Objective, finest: Objective) -> list[tuple[FloatArray, FloatArray]]:
-    """Angle and speed at the objective's times of the drum at rest and of a spline that follows the motion."""
-    still = np.zeros(len(objective.times))
-    knots = np.linalg.lstsq(spline_matrices(DURATION, INTERVALS, finest.times)[0], required_angle(finest), rcond=None)[
-        0
-    ]
-    angle, speed_ = spline_matrices(DURATION, INTERVALS, objective.times)
-    return [(still, still), (angle @ knots, speed_ @ knots)]
 
 
 @cache
 def objective() -> Objective:
-    """With the largest of STEPS that keeps Ω1 right for the drum at rest and for a drive that leaves little of it."""
+    """As the optimisers coarsely evaluate it."""
     scenario = paper_case()
-    finest = Objective(scenario, DURATION, FINE)
-    exact = [finest.evaluate(*drive).omega1 for drive in drives(finest, finest)]
-    for step in STEPS:
-        tried = Objective(scenario, DURATION, step)
-        found = [tried.evaluate(*drive).omega1 for drive in drives(tried, finest)]
-        if np.allclose(found, exact, rtol=RIGHT_TO, atol=0.0):
-            return tried
-    raise RuntimeError(f"no inner step of {STEPS} s keeps Ω1 right to {RIGHT_TO:g}")
+    return Objective(scenario, DURATION, coarse_step(scenario))
+
+
+@cache
+def finest() -> Objective:
+    """For the exact Ω1."""
+    return Objective(paper_case(), DURATION, FINE)
+
+
+def following(objective: Objective) -> tuple[FloatArray, FloatArray]:
+    """Angle and speed at the objective's times of a spline that follows the motion and leaves little of it."""
+    matrix = spline_matrices(DURATION, INTERVALS, finest().times)[0]
+    knots = np.linalg.lstsq(matrix, required_angle(finest()), rcond=None)[0]
+    angle, rate = spline_matrices(DURATION, INTERVALS, objective.times)
+    return angle @ knots, rate @ knots
 
 
 def microseconds(call: Callable[[], object], work: int) -> Measurement:
@@ -62,25 +57,33 @@ def microseconds(call: Callable[[], object], work: int) -> Measurement:
 
 def alone() -> Measurement:
     """Microseconds of one evaluation."""
-    o = objective()
-    angle, rate = drives(o, Objective(o.scenario, DURATION, FINE))[1]
-    return microseconds(lambda: o.evaluate(angle, rate), 1)
+    angle, rate = following(objective())
+    return microseconds(lambda: objective().evaluate(angle, rate), 1)
 
 
 def filled() -> Measurement:
-    """Microseconds of each evaluation when as many drives as a block has lanes are evaluated together."""
-    o = objective()
-    together: Callable[..., object] | None = getattr(o, "evaluate_many", None)
-    if together is None:
-        raise NotImplementedError("agents.objectives evaluates one drive at a time")
-    angle, rate = drives(o, Objective(o.scenario, DURATION, FINE))[1]
-    angles, rates = np.tile(angle, (LANES, 1)), np.tile(rate, (LANES, 1))
-    return microseconds(lambda: together(angles, rates), LANES)
+    """Microseconds of each evaluation, as many neighbours of a drive together as a block has lanes."""
+    angle, rate = following(objective())
+    none = np.zeros((len(angle), LANES))
+
+    def together() -> FloatArray:
+        errors = objective().errors_beside(angle, rate, none, none)
+        return np.trapezoid(errors**2, dx=objective().step, axis=0)
+
+    return microseconds(together, LANES)
 
 
-def step() -> Measurement:
-    """The inner step of the two above, ms."""
-    return lambda: 1e3 * objective().step
+def error() -> Measurement:
+    """Relative error of Ω1 at that inner step: the greater of a drum at rest's and of a drive's."""
+
+    def measure() -> float:
+        pairs = [
+            (objective().still(), finest().still()),
+            (objective().evaluate(*following(objective())), finest().evaluate(*following(finest()))),
+        ]
+        return max(abs(found.omega1 / exact.omega1 - 1.0) for found, exact in pairs)
+
+    return measure
 
 
 def table() -> Measurement:
@@ -93,9 +96,8 @@ def table() -> Measurement:
             subprocess.run(command, check=True, capture_output=True)
             return time.perf_counter() - begin
 
-    measure()
     return measure
 
 
 if __name__ == "__main__":
-    serve({"omega1-alone": alone, "omega1-filled": filled, "omega1-step": step, "paper-table": table})
+    serve({"omega1-alone": alone, "omega1-filled": filled, "omega1-error": error, "paper-table": table})
