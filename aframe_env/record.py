@@ -12,14 +12,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import BSpline, make_interp_spline
 
 from aframe_env.motion import COORDINATES, FloatArray
 from aframe_env.validation import InvalidValue, require_number
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 _LENGTHS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
 _ANGLES: Final = {"rad": 1.0, "deg": math.pi / 180.0}
@@ -74,6 +76,8 @@ class RecordedMotion:
         coordinates.setflags(write=False)
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "coordinates", coordinates)
+        from scipy.interpolate import make_interp_spline  # half of the time of importing the package
+
         object.__setattr__(self, "_spline", make_interp_spline(times, coordinates, k=5))
 
     @classmethod

@@ -11,7 +11,6 @@ import signal
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 from rich.box import SIMPLE
 from rich.console import Console
@@ -27,8 +26,6 @@ from benchmarks.workers import NotMeasured, Pythons, Worker
 from train.config import parse
 from train.output import user_errors
 
-QUICK_ROUNDS: Final = 2
-
 
 @dataclass(frozen=True)
 class Options:
@@ -37,7 +34,7 @@ class Options:
     rounds: int = 5
     """Samples of each measure, taken in turn."""
     quick: bool = False
-    """Two rounds, for trying."""
+    """For trying: one round, without what takes many seconds."""
     only: tuple[str, ...] = ()
     """Words: measure only what has one of them in its name, e.g. "envpool", "limit/double", "@1"."""
     out: Path | None = None
@@ -115,7 +112,7 @@ def _open(options: Options, partial: Path) -> Run:
     """A new run, or the interrupted one."""
     machine = Machine.here(_compiler())
     command = shlex.join(["python", "-m", "benchmarks", *(arg for arg in sys.argv[1:] if arg != "--resume")])
-    new = Run.new(command, QUICK_ROUNDS if options.quick else options.rounds, machine)
+    new = Run.new(command, 1 if options.quick else options.rounds, machine)
     if not options.resume:
         return new
     if not partial.exists():
@@ -135,7 +132,7 @@ def run(options: Options, console: Console) -> int:
         raise InvalidValue(f"out = {str(folder)!r}: is a file, must be a folder")
     partial = folder / "benchmarks.partial.json"
     measured = _open(options, partial)
-    measures = matching(options.only)
+    measures = matching(options.only, options.quick)
     for measure in measures:
         measured.series.setdefault(measure.key, Series())
     columns = (

@@ -54,6 +54,16 @@ def shown(series: Series, unit: str) -> str:
     return f"{spread(series.samples)} {unit}" if series.measured else series.error
 
 
+def best_of(run: Run, keys: Sequence[str]) -> str | None:
+    """The fastest of a peer's settings; None if none was measured."""
+    return max((key for key in keys if run.get(key).measured), key=lambda key: run.get(key).median, default=None)
+
+
+def ratios(mine: Series, peer: Series) -> list[float]:
+    """How many times the peer's speed, round by round."""
+    return [a / b for a, b in zip(mine.samples, peer.samples, strict=False)]
+
+
 @dataclass(frozen=True)
 class Ratio:
     """At least so many times a peer's speed: median of each round's ratio to the peer's best setting."""
@@ -70,16 +80,14 @@ class Ratio:
         bar = f"≥ {self.least:g} × {self.of}"
         mine = run.get(self.mine)
         measured = shown(mine, MEASURES[self.mine].unit)
-        candidates = [key for key in self.peers if run.get(key).measured]
-        if not candidates:
+        best = best_of(run, self.peers)
+        if best is None:
             return Verdict(self.what, bar, measured, run.get(self.peers[0]).error, "", None)
-        best = max(candidates, key=lambda key: run.get(key).median)
         peer = f"{MEASURES[best].what}: {shown(run.get(best), MEASURES[best].unit)}"
         if not mine.measured:
             return Verdict(self.what, bar, measured, peer, "", None)
-        ratios = [a / b for a, b in zip(mine.samples, run.get(best).samples, strict=False)]
-        met = statistics.median(ratios) >= self.least
-        return Verdict(self.what, bar, measured, peer, spread(ratios), met)
+        times = ratios(mine, run.get(best))
+        return Verdict(self.what, bar, measured, peer, spread(times), statistics.median(times) >= self.least)
 
 
 @dataclass(frozen=True)
@@ -125,8 +133,8 @@ class Linear:
         return Verdict(self.what, bar, f"p = {exponent:.3f}", "", "", abs(exponent - 1.0) <= self.tolerance)
 
 
-_ENVPOOL: Final = tuple(f"envpool/{name}@2" for name in ENVPOOL)
-_ENVPOOL_64: Final = tuple(key for key in _ENVPOOL if "-64-" in key)
+ENVPOOL_KEYS: Final = tuple(f"envpool/{name}@2" for name in ENVPOOL)
+ENVPOOL_64_KEYS: Final = tuple(key for key in ENVPOOL_KEYS if "-64-" in key)
 
 BARS: Final[tuple[Bar, ...]] = (
     Limit("C++ limit gives the package's trajectory", "limit/deviation@1", 1e-5),
@@ -136,10 +144,14 @@ BARS: Final[tuple[Bar, ...]] = (
         for n, cores in ((1, "one core"), (2, "two cores"))
     ),
     Ratio(
-        "vector env, whole episodes, N = 4096, two cores", "env/episodes-4096@2", _ENVPOOL, 5.0, "EnvPool at its best"
+        "vector env, whole episodes, N = 4096, two cores",
+        "env/episodes-4096@2",
+        ENVPOOL_KEYS,
+        5.0,
+        "EnvPool at its best",
     ),
     Ratio("vector env, whole episodes, N = 4096, two cores", "env/episodes-4096@2", ("limit/double@2",), 0.4, "C++"),
-    Ratio("vector env, whole episodes, N = 64", "env/episodes-64@2", _ENVPOOL_64, 3.0, "EnvPool with 64 rows"),
+    Ratio("vector env, whole episodes, N = 64", "env/episodes-64@2", ENVPOOL_64_KEYS, 3.0, "EnvPool with 64 rows"),
     Ratio("scalar env.step", "env/scalar@1", ("gymnasium/pendulum@1",), 1.0, "Pendulum-v1"),
     Ratio(
         "scalar env.step, inner step as by default",

@@ -37,6 +37,8 @@ class Measure:
     unit: str = STEPS
     rounds: int | None = None
     """Most rounds, where a sample takes long."""
+    slow: bool = False
+    """Takes many seconds to build or to measure: left out of a quick run."""
 
     @property
     def key(self) -> str:
@@ -99,26 +101,25 @@ def _others() -> Iterator[Measure]:
     yield Measure("drives", "omega1-alone", 1, DRIVES, "one evaluation of Ω1, paper's case, 36 s", "µs")
     yield Measure("drives", "omega1-filled", 1, DRIVES, "each of 64 evaluations of Ω1 together", "µs")
     yield Measure("drives", "omega1-error", 1, DRIVES, "relative error of Ω1 at the inner step of these", "", 1)
-    yield Measure("drives", "paper-table", 2, DRIVES, "python -m train.drives --case paper", "s", 1)
+    yield Measure("drives", "paper-table", 2, DRIVES, "python -m train.drives --case paper", "s", 1, slow=True)
     memory = "a row of the vector environment, 65,536 rows, drawn seas, over an autoreset"
-    yield Measure("env", "memory-peak", 2, ENVIRONMENTS, f"memory of {memory}, at its most", "KiB", 1)
-    yield Measure("startup", "cold", 1, STARTUP, "make and first reset, nothing compiled", "s", 1)
-    yield Measure("startup", "cold-vector", 1, STARTUP, "the same, vector environment", "s", 1)
-    yield Measure("startup", "import", 1, STARTUP, "import aframe_env, no torch in it", "s")
-    yield Measure("startup", "warm", 1, STARTUP, "make and first reset, warm compile cache", "s")
-    yield Measure("startup", "warm-vector", 1, STARTUP, "the same, vector environment", "s")
-    for rows in COST_ROWS:
-        yield Measure("cost", f"engine-{rows}", 2, ENVIRONMENTS, f"Engine.step, {rows:,} rows", rounds=3)
-    for rows in COST_ROWS:
-        yield Measure(
-            "cost", f"env-{rows}", 2, ENVIRONMENTS, f"vector environment within episodes, {rows:,} rows", rounds=3
-        )
+    yield Measure("env", "memory-peak", 2, ENVIRONMENTS, f"memory of {memory}, at its most", "KiB", 1, slow=True)
+    for what, start in (("", "the environment"), ("-vector", "the vector environment")):
+        yield Measure("startup", f"cold{what}", 1, STARTUP, f"make and reset {start}, nothing compiled", "s", 1, True)
+        yield Measure("startup", f"warm{what}", 1, STARTUP, f"make and reset {start}, warm cache", "s", 3, True)
+    yield Measure("startup", "import", 1, STARTUP, "import aframe_env, no torch in it", "s", 3, True)
+    for name, what in (("engine", "Engine.step"), ("env", "vector environment within episodes")):
+        for rows in COST_ROWS:
+            yield Measure(
+                "cost", f"{name}-{rows}", 2, ENVIRONMENTS, f"{what}, {rows:,} rows", rounds=3, slow=rows > 4096
+            )
 
 
 MEASURES: Final[dict[str, Measure]] = {measure.key: measure for measure in (*_speeds(), *_others())}
 """By key, in the order of the run."""
 
 
-def matching(only: tuple[str, ...]) -> list[Measure]:
-    """Measures whose key has one of the words in it; all if there are none."""
-    return [m for m in MEASURES.values() if not only or any(word in m.key for word in only)]
+def matching(only: tuple[str, ...], quick: bool = False) -> list[Measure]:
+    """Measures whose key has one of the words in it, all if there are none; a quick run is spared the slow ones."""
+    wanted = [m for m in MEASURES.values() if not only or any(word in m.key for word in only)]
+    return [m for m in wanted if not (quick and m.slow)]

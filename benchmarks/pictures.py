@@ -46,19 +46,19 @@ def draw(path: Path, run: Run) -> None:
 
 
 def _cost(axis: Axes, run: Run) -> None:
-    for prefix, label, marker in (("cost/env", "vector env's step", "o"), ("cost/engine", "Engine.step", "s")):
+    for prefix, label, colour in (("cost/env", "vector env's step", OURS), ("cost/engine", "Engine.step", LIMIT)):
         points = [(n, run.get(f"{prefix}-{n}@2")) for n in COST_ROWS]
         kept = [(n, n / series.median) for n, series in points if series.measured]
         if kept:
             rows, seconds = zip(*kept, strict=True)
-            axis.plot(rows, seconds, marker=marker, ms=4, label=label)
+            axis.plot(rows, seconds, marker="o", ms=4, color=colour, label=label)
             axis.plot(COST_ROWS, [seconds[-1] / rows[-1] * n for n in COST_ROWS], ":", lw=1, color="#8a8f98")
     axis.set_xscale("log", base=4)
     axis.set_xticks(COST_ROWS, [f"{n:,}" for n in COST_ROWS], rotation=45)
     axis.set_yscale("log")
     axis.set_xlabel("rows N")
     axis.set_ylabel("seconds a step of all rows")
-    axis.set_title("Cost against N, two cores (dotted: proportional to N)", fontsize=11)
+    axis.set_title("Cost against N, two cores\n(dotted: proportional to N)", fontsize=11)
     axis.grid(alpha=0.3)
     if axis.get_legend_handles_labels()[0]:
         axis.legend()
@@ -81,5 +81,8 @@ def _speeds(axis: Axes, run: Run) -> None:
     if shown:
         axis.set_xlim(0.5 * shown[0][1].median, 8.0 * shown[-1][1].median)
     axis.set_xlabel("env steps/s (median; line: least to greatest)")
-    axis.set_title("One env step: ten RK4 steps here, one Euler step in the pendulums", fontsize=11)
+    axis.set_title(
+        "Speed on two cores, scalar ones on one\n(a step: ten RK4 steps here, one Euler step in pendulums)",
+        fontsize=11,
+    )
     axis.grid(alpha=0.3, axis="x")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import statistics
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Final
 
-from benchmarks.bars import Verdict, shown, verdicts
+from benchmarks.bars import ENVPOOL_64_KEYS, ENVPOOL_KEYS, Verdict, best_of, number, ratios, shown, verdicts
 from benchmarks.catalogue import MEASURES
 from benchmarks.pictures import draw
 from benchmarks.results import Run
@@ -22,6 +24,32 @@ an env step) unless said, float64, a load in three dimensions, 32 wave component
 without sea, lag, limit switches and a rope that parts. "Dynamics alone" is `Engine.step`, which with a sea includes
 its synthesis.
 """
+HEADLINES: Final[tuple[tuple[str, str, tuple[str, ...], str], ...]] = (
+    (
+        "vector environment, 4096 rows, two cores: whole episodes with autoreset, seas drawn anew",
+        "env/episodes-4096@2",
+        ENVPOOL_KEYS,
+        "EnvPool's Pendulum-v1 at its best setting",
+    ),
+    ("the same with 64 rows", "env/episodes-64@2", ENVPOOL_64_KEYS, "EnvPool's Pendulum-v1 with 64 rows"),
+    ("scalar `env.step`", "env/scalar@1", ("gymnasium/pendulum@1",), "Gymnasium's Pendulum-v1"),
+    ("dynamics alone, ship at rest, 4096 rows, one core", "dynamics/calm@1", ("limit/double@1",), "hand-written C++"),
+    ("the same with 32 wave components", "dynamics/sea@1", ("solve_ivp/episode@1",), "`scipy.solve_ivp`"),
+    ("one evaluation of Ω1 over 36 s, the paper's case", "drives/omega1-alone@1", (), ""),
+    ("each of 64 of these together", "drives/omega1-filled@1", (), ""),
+    ("memory of a row of the vector environment", "env/memory-peak@2", (), ""),
+    ("make and reset the environment, warm compile cache", "startup/warm@1", (), ""),
+)
+"""What the README quotes: what, measure, peer's measures, peer."""
+
+
+def headlines(run: Run) -> Iterator[tuple[str, str, str]]:
+    """What, its median, and its ratio to the peer."""
+    for what, key, peers, name in HEADLINES:
+        if run.get(key).measured:
+            best = best_of(run, peers)
+            ratio = f"{number(statistics.median(ratios(run.get(key), run.get(best))))} × {name}" if best else ""
+            yield what, f"{number(run.get(key).median)} {MEASURES[key].unit}", ratio
 
 
 def markdown(run: Run, rows: Sequence[Verdict]) -> str:
@@ -45,7 +73,9 @@ def markdown(run: Run, rows: Sequence[Verdict]) -> str:
         "# Benchmarks",
         f"`{run.command}` on {machine.processor}, {machine.cores} cores, {pinned}; {machine.system}; "
         f"{machine.compiler}; {run.rounds} rounds.",
+        _table(("what", "figure", "beside its peer"), list(headlines(run))),
         NOTES,
+        "## Bars",
         _table(HEADINGS, table),
         "![Cost against the number of rows; env steps a second](benchmarks.png)",
         "## Every figure",
