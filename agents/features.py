@@ -2,8 +2,8 @@
 
 The inputs are numbers of order one, each a fixed function of the observation and, for sensors, of a short memory of
 the readings, so that an agent needs no running statistics and means the same on every crane and in every sea. The
-output is a share of the change of speed that the winch is capable of within a control step: of the whole range of
-drum speeds only so much is in reach.
+output says how fast the rope's upper end is to go up or down in space. A feed-forward takes up what the pulley is about
+to move meanwhile: with an output of zero the drum only follows the pulley.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ Float32Array = npt.NDArray[np.float32]
 
 LIMIT = 20.0
 """Features are clipped to ± this."""
+AUTHORITY = 0.25
+"""An output of 1 moves the rope's end by what the winch's greatest acceleration makes of so many seconds."""
 _DAMPING_RATIO = 0.03  # of the load's bobbing on the rope, share of critical
 
 STATE_FEATURES = (
@@ -64,6 +66,8 @@ class StateFeatures:
 
     def __init__(self, rows: int, control_period: float) -> None:
         self._lifts = Lifts(rows, control_period, STATE)
+        self._rise = np.zeros(rows)
+        """Of the pulley during the coming control step, (N,) m."""
 
     def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
         """Features (n, F) of the first observations (n, K) of these ``rows``, lifts with these ``cranes`` (n)."""
@@ -73,13 +77,15 @@ class StateFeatures:
         """Features (N, F) of all rows, whose observations (N, K) are one control step later."""
         return self._look(self._lifts.columns(observation), ALL)
 
-    def command(self, share: FloatArray) -> FloatArray:
-        """Drum speed commands (N,) rad/s for shares (N,) of what the winch can change."""
-        return self._lifts.winch.reach(share)
+    def command(self, output: FloatArray) -> FloatArray:
+        """Drum speed commands (N,) rad/s for a network's output (N,), in [-1, 1]."""
+        return self._lifts.winch.find(_turn(self._rise, output, self._lifts))
 
     def _look(self, o: Columns, rows: Rows) -> Float32Array:
         lifts = self._lifts
         lifts.winch.speed[rows] = o["drum_speed"]
+        step = lifts.period
+        self._rise[rows] = step * (o["pulley_velocity_z"] + 0.5 * step * o["pulley_acceleration_z"])
         return _stacked(
             *_of_the_load(o["depth_error"], o["load_velocity_z"], lifts.stretch(o, rows)),
             _rope_end_speed(o["pulley_velocity_z"], lifts, rows),
@@ -105,6 +111,8 @@ class SensedFeatures:
         self._turns = np.zeros((round(sensors.delay / control_period), rows))
         """(steps of delay, N) how far the drums have turned since the moment that the readings speak of, rad."""
         self._heave_rate, self._drum_angle, self._first_angle, self._depth_error = np.zeros((4, rows))
+        self._rise = np.zeros(rows)
+        """Of the pulley during the coming control step, (N,) m."""
 
     def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
         """Features (n, F) of the first observations (n, K) of these ``rows``, whose past is forgotten."""
@@ -135,16 +143,17 @@ class SensedFeatures:
         self._depth_error = self._waves.heave() - paid_out
         return self._look(o, ALL)
 
-    def command(self, share: FloatArray) -> FloatArray:
-        """Drum speed commands (N,) rad/s for shares (N,) of what the winch can change."""
-        command = self._lifts.winch.reach(share)
-        turned = self._lifts.winch.turn(command)
+    def command(self, output: FloatArray) -> FloatArray:
+        """Drum speed commands (N,) rad/s for a network's output (N,), in [-1, 1]."""
+        command, turned = self._lifts.winch.command(_turn(self._rise, output, self._lifts))
         self._turns = np.concatenate([self._turns, turned[None]])[1:] if len(self._turns) else self._turns
         return command
 
     def _look(self, o: Columns, rows: Rows) -> Float32Array:
         lifts, step = self._lifts, self._period
         depth_error, load_velocity, rope_end = self._present()[rows].T
+        path = self._waves.path(self._delay + step * np.arange(2.0))
+        self._rise[rows] = (path[1] - path[0])[rows]
         rate = self._waves.rate(self._delay + step * np.arange(3.0))[:, rows]
         soon, later = np.diff(rate, axis=0) / step
         acceleration, jerk = self._pulley.rate(rows), self._pulley.bend(rows)
@@ -175,6 +184,12 @@ Features = StateFeatures | SensedFeatures
 def features_for(rows: int, control_period: float, sensors: Sensors | None) -> Features:
     """Features of N rows with these sensors; None where the full state is observed."""
     return SensedFeatures(rows, control_period, sensors) if sensors else StateFeatures(rows, control_period)
+
+
+def _turn(rise: FloatArray, output: FloatArray, lifts: Lifts) -> FloatArray:
+    winch = lifts.winch
+    up = AUTHORITY * winch.max_acceleration * winch.radius * np.clip(output, -1.0, 1.0)
+    return np.asarray((rise - lifts.period * up) / winch.radius)
 
 
 def _of_the_load(depth_error: FloatArray, velocity: FloatArray, stretch: FloatArray) -> tuple[FloatArray, ...]:

@@ -28,6 +28,7 @@ from agents.policy import FloatArray, Knowledge
 FORMAT = 2
 WEIGHTS = "agent.safetensors"
 CARD = "agent.json"
+_BLOCK = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +64,7 @@ class LearnedPolicy:
     knows: Knowledge = field(init=False)
 
     def __post_init__(self) -> None:
-        self.name = self.card.algorithm
+        self.name = self.card.algorithm if self.card.observation == "state" else f"{self.card.algorithm} on sensors"
         self.knows = Knowledge.STATE if self.card.observation == "state" else Knowledge.SENSORS
         self._quantities = STATE if self.card.observation == "state" else SENSED
         self._features: Features | None = None
@@ -88,9 +89,16 @@ class LearnedPolicy:
             inputs = self._features.start(observation, self._cranes)
         else:
             inputs = self._features.advance(observation)
+        return self._features.command(self._output(inputs))
+
+    def _output(self, inputs: npt.NDArray[np.float32]) -> FloatArray:
+        # In blocks of one size: how a matrix product is summed depends on its shape, and a row must not on the others.
+        rows = len(inputs)
+        padded = np.zeros((-(-rows // _BLOCK) * _BLOCK, inputs.shape[1]), dtype=np.float32)
+        padded[:rows] = inputs
         with torch.no_grad():
-            share = self.actor(torch.from_numpy(inputs))
-        return self._features.command(share[:, 0].double().numpy())
+            blocks = [self.actor(block) for block in torch.split(torch.from_numpy(padded), _BLOCK)]
+        return np.asarray(torch.cat(blocks)[:rows, 0].double().numpy())
 
     def predict(
         self, observation: npt.NDArray[np.float32], *, first: bool = False, crane: Crane | None = None
@@ -124,9 +132,20 @@ def card_text(card: AgentCard) -> str:
     return json.dumps(asdict(card), indent=2, ensure_ascii=False) + "\n"
 
 
+def seeds(folder: str | Path) -> list[Path]:
+    """Folders of the agents in a folder that training with several seeds wrote, the lowest seed first."""
+    numbered = {int(path.name[5:]): path for path in Path(folder).glob("seed-*") if path.name[5:].isdigit()}
+    return [numbered[seed] for seed in sorted(numbered)]
+
+
 def load(folder: str | Path) -> LearnedPolicy:
-    """Load an agent from its folder. Raises InvalidValue where the files do not belong together."""
+    """Load an agent from its folder; that of the lowest seed where there are several.
+
+    Raises InvalidValue where there is none or its files do not belong together.
+    """
     path = Path(folder)
+    if not (path / CARD).is_file() and seeds(path):
+        path = seeds(path)[0]
     try:
         text = (path / CARD).read_text(encoding="utf-8")
         weights = (path / WEIGHTS).read_bytes()

@@ -50,11 +50,6 @@ class WinchModel:
         _kernels().invert(self.speed, self.max_speed, self.max_acceleration, self._lag, self._period, turn, command)
         return command
 
-    def reach(self, share: FloatArray) -> FloatArray:
-        """Commands (N,) rad/s that change the speed by shares (N,), in [-1, 1], of what a control step allows."""
-        change = self.max_acceleration * (self._period + self._lag) * np.clip(share, -1.0, 1.0)
-        return np.clip(self.speed + change, -self.max_speed, self.max_speed)
-
     def turn(self, command: FloatArray) -> FloatArray:
         """How far the drums turn (N,) rad at these commands (N,) rad/s; the reckoned speed is carried on."""
         turned = np.empty_like(command)
