@@ -12,12 +12,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.dynamics.compiling import kernel, source_digest
+from aframe_env.dynamics.compiling import kernel
 from aframe_env.motion import ComplexArray, Components, FloatArray
 from aframe_env.random import uniform
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
@@ -196,7 +196,6 @@ def _quantile(table: FloatArray, probability: float) -> float:
 
 @cache
 def _realise_kernel() -> Callable[..., tuple[FloatArray, FloatArray, FloatArray]]:
-    source: Any = source_digest()
 
     @kernel
     def realise(
@@ -208,7 +207,6 @@ def _realise_kernel() -> Callable[..., tuple[FloatArray, FloatArray, FloatArray]
         heading: float,
         direction_table: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        source  # noqa: B018
         frequency = np.empty(components)
         direction = np.empty(components)
         phase = np.empty(components)

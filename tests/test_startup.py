@@ -107,6 +107,17 @@ def test_without_any_cache_folder_it_still_runs_and_says_so(tmp_path: Path, read
     assert output == run(SMALL)[0]
 
 
+def test_a_change_of_what_a_kernel_calls_compiles_it_anew(tmp_path: Path) -> None:
+    shutil.copytree(PACKAGE, tmp_path / "aframe_env", ignore=shutil.ignore_patterns("__pycache__"))
+    before, _ = run(SMALL, PYTHONPATH=tmp_path)
+    called = tmp_path / "aframe_env" / "random.py"
+    source = called.read_text(encoding="utf-8")
+    called.write_text(source.replace("/ 9007199254740992.0", "/ 18014398509481984.0"), encoding="utf-8")
+    after, announced = run(SMALL, PYTHONPATH=tmp_path)
+    assert MESSAGE in announced
+    assert after != before
+
+
 def test_two_processes_compile_at_once(tmp_path: Path) -> None:
     both = [start(SMALL, NUMBA_CACHE_DIR=tmp_path) for _ in range(2)]
     outputs = [process.communicate(timeout=120)[0] for process in both]

@@ -48,8 +48,8 @@ def parallel_kernel(function: F) -> F:
 
 
 def _cached(function: F, **options: Any) -> F:
-    # numba numbers the variants of a function (other lanes, other sources) in one index, without a lock: of two
-    # processes that compile at once, one could later be given the other's variant. A name for each keeps them apart.
+    # numba numbers a function's variants (other sources, other lanes) in one index, without a lock: of two processes
+    # that compile at once, one could later be given the other's variant. A name of its own for each keeps them apart.
     cells = [cell.cell_contents for cell in function.__closure__ or ()]
     own_source = Path(function.__code__.co_filename).read_bytes()
     variant = hashlib.sha256(f"{source_digest()} {cells!r} ".encode() + own_source).hexdigest()[:16]
@@ -74,12 +74,14 @@ class _Announcer(event.Listener):
         self._silent = True
         folder = dispatcher.stats.cache_path
         kept = (
-            f"later runs take it from {folder} and its like"
+            f"later runs find it in {folder}"
             if folder
             else "nothing can be kept, as no cache folder can be written to: set NUMBA_CACHE_DIR to one"
         )
         # A warning, since information is not shown by default.
-        _LOGGER.warning("aframe_env: compiling the physics for this processor, up to half a minute; %s", kept)
+        _LOGGER.warning(
+            "aframe_env: compiling the physics for this processor, which takes up to half a minute; %s", kept
+        )
 
     def on_end(self, event: Any) -> None:
         """Nothing to say."""
@@ -113,8 +115,7 @@ def fma(a: float, b: float, c: float) -> float:
 def source_digest() -> str:
     """Digest of the sources of whatever compiled code calls: the physics, and the random numbers.
 
-    numba invalidates a cached kernel when the kernel's own file changes, not when a function that it calls does.
-    A kernel that closes over this digest is compiled anew after any change.
+    numba finds a cached kernel stale when the kernel's own file changes, not when a function that it calls does.
     """
     digest = hashlib.sha256()
     physics = Path(__file__).parent

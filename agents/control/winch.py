@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.dynamics.compiling import kernel, source_digest
+from aframe_env.dynamics.compiling import kernel
 from aframe_env.dynamics.winch import drum_state, plan
 from aframe_env.scenario import Scenario
 
@@ -47,11 +46,9 @@ class WinchModel:
 
 @cache
 def _kernel() -> Callable[..., None]:
-    source: Any = source_digest()
 
     @kernel
     def invert(turn, limit, acceleration, lag, period, speed, command, turned):  # type: ignore[no-untyped-def]
-        source  # noqa: B018
         for i in range(turn.shape[0]):
             low, high = -limit[i], limit[i]
             angle, after = 0.0, 0.0
