@@ -74,7 +74,9 @@ class Simulation:
             self._engine = FlexibleEngine(rows, control_period, self._mesh, max_inner_step=max_inner_step)
         self._report = task.report_kernel(self._engine.lanes)
         sensors = Sensors() if observation == "sensors" else observation
-        self._bank = SensorBank(sensors, rows, control_period) if isinstance(sensors, Sensors) else None
+        self.sensors = sensors if isinstance(sensors, Sensors) else None
+        """None where the full state is observed."""
+        self._bank = SensorBank(self.sensors, rows, control_period) if self.sensors else None
         quantities = task.STATE if self._bank is None else task.SENSED
         self.quantities = quantities
         self.observation_space = task.box(quantities)

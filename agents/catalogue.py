@@ -9,7 +9,7 @@ import importlib
 import inspect
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final, Protocol, TypeVar
@@ -141,13 +141,23 @@ def choose(text: str) -> Choice:
 
 
 def choose_all(texts: Sequence[str]) -> list[Choice]:
-    """Policies from their names, folders or functions; two of one name are told apart by what was asked for."""
-    choices = [choose(text) for text in dict.fromkeys(texts)]
-    names = [choice.name for choice in choices]
-    return [
-        Choice(f"{c.name} ({text})", c.build, c.for_each_scenario) if names.count(c.name) > 1 else c
-        for text, c in zip(dict.fromkeys(texts), choices, strict=True)
-    ]
+    """Policies from their names, folders or functions; a folder of agents of several seeds stands for all of them.
+
+    Policies of one name are told apart by their seeds or else by what was asked for.
+    """
+    asked = list(dict.fromkeys(each for text in texts for each in _expanded(text)))
+    choices = [choose(text) for text in asked]
+    for tell in (lambda text: Path(text).name.replace("-", " "), lambda text: text):
+        names = [choice.name for choice in choices]
+        choices = [
+            replace(choice, name=f"{choice.name}, {tell(text)}") if names.count(choice.name) > 1 else choice
+            for text, choice in zip(asked, choices, strict=True)
+        ]
+    return choices
+
+
+def _expanded(text: str) -> list[str]:
+    return [str(path) for path in learned.seeds(text)] or [text]
 
 
 def as_choice(policy: Policy) -> Choice:
@@ -159,6 +169,8 @@ def _from_folder(folder: Path) -> Policy:
     for file, load_it in FOLDERS.items():
         if (folder / file).is_file():
             return load_it(folder)
+    if learned.seeds(folder):
+        return learned.load(folder)
     raise InvalidValue(f"policy = {str(folder)!r}: no agent in this folder: it has none of {', '.join(FOLDERS)}")
 
 

@@ -9,12 +9,14 @@ filter for the load, which is carried by the acceleration that the tension tells
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.int64] | slice
+ALL: Final = slice(None)
 
 HEAVE_MEMORY = 0.7
 """Share that a reading of the heave rate keeps of its weight after a control step."""

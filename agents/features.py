@@ -1,52 +1,52 @@
-"""From observations in physical units to the inputs of a network: numbers of order one, nothing added.
+"""What agents see and do: from observations to the inputs of a network, and from its output to a drum speed.
 
-Each feature is a fixed function of the observation and, for sensors, of a short memory of the readings (see
-``estimation``), so that an agent needs no running statistics and means the same on every crane and in every sea.
+The inputs are numbers of order one, each a fixed function of the observation and, for sensors, of a short memory of
+the readings, so that an agent needs no running statistics and means the same on every crane and in every sea. The
+output says how fast the rope's upper end is to go up or down in space. A feed-forward takes up what the pulley is about
+to move meanwhile: with an output of zero the drum only follows the pulley.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.crane import GRAVITY
+from aframe_env.crane import GRAVITY, Crane
+from aframe_env.sensors import Sensors
 from aframe_env.task import SENSED, STATE, Quantity
 from aframe_env.validation import InvalidValue
-from agents.estimation import Estimator, Readings
+from agents.control.regulator import Columns, Lifts, Observation
+from agents.estimation import ALL, HEAVE_MEMORY, FadingPolynomial, FloatArray, Rows
+from agents.kalman import RopeFilter, WaveBank, WaveFilter
 
 Float32Array = npt.NDArray[np.float32]
 
-_TYPICAL_STIFFNESS = 2.0e8  # N, turns tension into stretch: a scale, not a claim about the crane at hand
-_LIMIT = 20.0
+LIMIT = 20.0
+"""Features are clipped to ± this."""
+AUTHORITY = 0.25
+"""An output of 1 moves the rope's end by what the winch's greatest acceleration makes of so many seconds."""
+_DAMPING_RATIO = 0.03  # of the load's bobbing on the rope, share of critical
 
 STATE_FEATURES = (
     "depth_error",
+    "depth_error_near_zero",
     "load_velocity_z",
-    "load_acceleration_z",
+    "stretch_deviation",
+    "rope_end_speed",
     "pulley_velocity_z",
     "pulley_acceleration_z",
-    "drum_speed",
-    "stretch_deviation",
     "pulley_heave",
     "load_mass",
     "rope_length",
     "bobbing_rate",
 )
 SENSED_FEATURES = (
-    "depth_error_estimate",
-    "load_velocity_estimate",
-    "load_acceleration_z",
-    "pulley_velocity_estimate",
-    "pulley_acceleration_estimate",
-    "pulley_jerk_estimate",
-    "drum_speed",
-    "stretch_estimate",
-    "pulley_heave",
-    "roll",
-    "pitch",
-    "load_mass",
-    "rope_length",
-    "bobbing_rate",
+    *STATE_FEATURES[:-3],
+    "pulley_acceleration_to_come",
+    "pulley_acceleration_after_that",
+    *STATE_FEATURES[-3:],
 )
 
 
@@ -59,100 +59,156 @@ def feature_names(quantities: tuple[Quantity, ...]) -> tuple[str, ...]:
     raise InvalidValue(f"no features for an observation of {[q.name for q in quantities]}")
 
 
-class FeatureMaker:
-    """Features of N rows, control step by control step."""
+class StateFeatures:
+    """Features of N rows that observe the full state."""
 
-    def __init__(self, quantities: tuple[Quantity, ...], rows: int, control_period: float) -> None:
-        self.names = feature_names(quantities)
-        self._columns = {q.name: i for i, q in enumerate(quantities)}
-        self._estimator = Estimator(rows, control_period) if quantities == SENSED else None
+    names = STATE_FEATURES
 
-    def start(self, observation: npt.NDArray[np.float32], rows: npt.NDArray[np.int64]) -> Float32Array:
-        """Features (n, F) of the first observations (n, K) of these ``rows`` (n,), whose past is forgotten."""
-        o = observation.astype(np.float64)
-        if self._estimator is None:
-            return self._state_features(o)
-        self._estimator.start(self._readings(o), rows)
-        return self._sensed_features(o, self._estimator, rows)
+    def __init__(self, rows: int, control_period: float) -> None:
+        self._lifts = Lifts(rows, control_period, STATE)
+        self._rise = np.zeros(rows)
+        """Of the pulley during the coming control step, (N,) m."""
 
-    def advance(self, observation: npt.NDArray[np.float32]) -> Float32Array:
+    def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
+        """Features (n, F) of the first observations (n, K) of these ``rows``, lifts with these ``cranes`` (n)."""
+        return self._look(self._lifts.start(cranes, observation, rows), rows)
+
+    def advance(self, observation: Observation) -> Float32Array:
         """Features (N, F) of all rows, whose observations (N, K) are one control step later."""
-        o = observation.astype(np.float64)
-        if self._estimator is None:
-            return self._state_features(o)
-        self._estimator.advance(self._readings(o))
-        return self._sensed_features(o, self._estimator, slice(None))
+        return self._look(self._lifts.columns(observation), ALL)
 
-    def _readings(self, o: npt.NDArray[np.float64]) -> Readings:
-        mass, length = o[:, self._columns["load_mass"]], o[:, self._columns["rope_length"]]
-        excess = o[:, self._columns["rope_tension"]] / (mass * GRAVITY) - 1.0
-        return Readings(
-            heave_rate=o[:, self._columns["pulley_velocity_z"]],
-            drum_angle=o[:, self._columns["drum_angle"]],
-            stretch=excess * mass * GRAVITY * length / _TYPICAL_STIFFNESS,
-            load_acceleration=excess * GRAVITY,
-            depth_error=o[:, self._columns["depth_error"]],
+    def command(self, output: FloatArray) -> FloatArray:
+        """Drum speed commands (N,) rad/s for a network's output (N,), in [-1, 1]."""
+        return self._lifts.winch.find(_turn(self._rise, output, self._lifts))
+
+    def _look(self, o: Columns, rows: Rows) -> Float32Array:
+        lifts = self._lifts
+        lifts.winch.speed[rows] = o["drum_speed"]
+        step = lifts.period
+        self._rise[rows] = step * (o["pulley_velocity_z"] + 0.5 * step * o["pulley_acceleration_z"])
+        return _stacked(
+            *_of_the_load(o["depth_error"], o["load_velocity_z"], lifts.stretch(o, rows)),
+            _rope_end_speed(o["pulley_velocity_z"], lifts, rows),
+            o["pulley_velocity_z"],
+            o["pulley_acceleration_z"],
+            *_of_the_lift(o, lifts, rows),
         )
 
-    def _state_features(self, o: npt.NDArray[np.float64]) -> Float32Array:
-        return state_features(o, self._columns)
 
-    def _sensed_features(
-        self, o: npt.NDArray[np.float64], estimator: Estimator, rows: npt.NDArray[np.int64] | slice
-    ) -> Float32Array:
-        column = {name: o[:, i] for name, i in self._columns.items()}
-        mass, length, drum_speed = column["load_mass"], column["rope_length"], column["drum_speed"]
-        excess = column["rope_tension"] / (mass * GRAVITY) - 1.0
-        estimate = estimator.estimate(rows)
-        derived = (
-            _side(estimate.depth_error),
-            2.0 * estimate.load_velocity,
-            4.0 * excess,
-            estimate.pulley_velocity,
-            estimate.pulley_acceleration,
-            estimate.pulley_jerk,
-            0.75 * drum_speed,
-            4.0 * estimate.stretch,
-            0.5 * column["pulley_heave"],
-            10.0 * column["roll"],
-            20.0 * column["pitch"],
-            *_lift(mass, length),
+class SensedFeatures:
+    """Features of N rows that have sensors: what the readings, and the commands since, tell of the present."""
+
+    names = SENSED_FEATURES
+
+    def __init__(self, rows: int, control_period: float, sensors: Sensors) -> None:
+        self._period, self._sensors = control_period, sensors
+        self._delay = control_period * round(sensors.delay / control_period)
+        self._lifts = Lifts(rows, control_period, SENSED)
+        self._model = self._lifts.model(_DAMPING_RATIO)
+        self._waves = WaveFilter(rows, control_period, max(1, round(sensors.depth_error.period / control_period)))
+        self._rope = RopeFilter(rows, WaveBank().rate_noise)
+        self._pulley = FadingPolynomial(rows, HEAVE_MEMORY, control_period)
+        self._turns = np.zeros((round(sensors.delay / control_period), rows))
+        """(steps of delay, N) how far the drums have turned since the moment that the readings speak of, rad."""
+        self._heave_rate, self._drum_angle, self._first_angle, self._depth_error = np.zeros((4, rows))
+        self._rise = np.zeros(rows)
+        """Of the pulley during the coming control step, (N,) m."""
+
+    def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
+        """Features (n, F) of the first observations (n, K) of these ``rows``, whose past is forgotten."""
+        o = self._lifts.start(cranes, observation, rows)
+        model = self._lifts.model(_DAMPING_RATIO, rows)
+        tension = self._sensors.tension
+        noise = np.maximum(tension.noise, tension.relative_noise * o["load_mass"] * GRAVITY)
+        self._model.replace(rows, model)
+        self._rope.start(model, self._period, self._lifts.stretch_under(noise, o, rows), rows)
+        self._waves.start(rows)
+        self._pulley.start(o["pulley_velocity_z"], rows)
+        self._turns[:, rows] = 0.0
+        self._heave_rate[rows], self._drum_angle[rows] = o["pulley_velocity_z"], o["drum_angle"]
+        self._first_angle[rows], self._depth_error[rows] = o["drum_angle"], 0.0
+        return self._look(o, rows)
+
+    def advance(self, observation: Observation) -> Float32Array:
+        """Features (N, F) of all rows, whose observations (N, K) are one control step later."""
+        o, radius = self._lifts.columns(observation), self._lifts.winch.radius
+        heave_rate, drum_angle = o["pulley_velocity_z"], o["drum_angle"]
+        speed = 0.5 * (heave_rate + self._heave_rate) - radius * (drum_angle - self._drum_angle) / self._period
+        self._heave_rate, self._drum_angle = heave_rate, drum_angle
+        self._pulley.advance(heave_rate)
+        self._waves.advance(heave_rate)
+        self._rope.advance(speed, self._lifts.stretch(o))
+        paid_out = radius * (drum_angle - self._first_angle) + self._rope.stretch
+        self._waves.correct(o["depth_error"] - self._waves.heave() + paid_out)
+        self._depth_error = self._waves.heave() - paid_out
+        return self._look(o, ALL)
+
+    def command(self, output: FloatArray) -> FloatArray:
+        """Drum speed commands (N,) rad/s for a network's output (N,), in [-1, 1]."""
+        command, turned = self._lifts.winch.command(_turn(self._rise, output, self._lifts))
+        self._turns = np.concatenate([self._turns, turned[None]])[1:] if len(self._turns) else self._turns
+        return command
+
+    def _look(self, o: Columns, rows: Rows) -> Float32Array:
+        lifts, step = self._lifts, self._period
+        depth_error, load_velocity, rope_end = self._present()[rows].T
+        path = self._waves.path(self._delay + step * np.arange(2.0))
+        self._rise[rows] = (path[1] - path[0])[rows]
+        rate = self._waves.rate(self._delay + step * np.arange(3.0))[:, rows]
+        soon, later = np.diff(rate, axis=0) / step
+        acceleration, jerk = self._pulley.rate(rows), self._pulley.bend(rows)
+        return _stacked(
+            *_of_the_load(depth_error, load_velocity, rope_end - depth_error),
+            _rope_end_speed(rate[0], lifts, rows),
+            rate[0],
+            acceleration + jerk * (self._delay + 0.5 * step),
+            soon,
+            later,
+            *_of_the_lift(o, lifts, rows),
         )
-        return _stacked(derived)
+
+    def _present(self) -> FloatArray:
+        """(N, 3) depth error, load's velocity and rope's end, carried over the sensors' delay by the rope's model."""
+        rises = np.diff(self._waves.path(self._period * np.arange(len(self._turns) + 1.0)), axis=0)
+        depth_error, still = self._depth_error, np.zeros_like(self._depth_error)
+        z = np.stack([depth_error, self._rope.load_velocity, depth_error + self._rope.stretch, still], axis=1)
+        for rise, turn in zip(rises, self._turns, strict=True):
+            z[:, 3] = 0.0
+            z = self._model.advance(z, (rise - self._lifts.winch.radius * turn) / self._period)
+        return z[:, :3]
 
 
-def state_features(o: npt.NDArray[np.float64], columns: dict[str, int]) -> Float32Array:
-    """Features (N, F) of the full state (N, K)."""
-    column = {name: o[:, i] for name, i in columns.items()}
-    mass, length = column["load_mass"], column["rope_length"]
-    excess = column["rope_tension"] / (mass * GRAVITY) - 1.0
-    derived = (
-        _side(column["depth_error"]),
-        2.0 * column["load_velocity_z"],
-        4.0 * excess,
-        column["pulley_velocity_z"],
-        column["pulley_acceleration_z"],
-        0.75 * column["drum_speed"],
-        4.0 * excess * mass * GRAVITY * length / _TYPICAL_STIFFNESS,
-        0.5 * column["pulley_heave"],
-        *_lift(mass, length),
-    )
-    return _stacked(derived)
+Features = StateFeatures | SensedFeatures
 
 
-def _side(depth_error: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Depth error; beyond some metres only its side, so that there the agent does what it has learned nearer."""
-    return 4.0 * np.tanh(0.5 * depth_error)
+def features_for(rows: int, control_period: float, sensors: Sensors | None) -> Features:
+    """Features of N rows with these sensors; None where the full state is observed."""
+    return SensedFeatures(rows, control_period, sensors) if sensors else StateFeatures(rows, control_period)
 
 
-def _lift(mass: npt.NDArray[np.float64], length: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], ...]:
-    """What stays as it is during a lift: mass, length, rate of the load's bobbing on the rope."""
+def _turn(rise: FloatArray, output: FloatArray, lifts: Lifts) -> FloatArray:
+    winch = lifts.winch
+    up = AUTHORITY * winch.max_acceleration * winch.radius * np.clip(output, -1.0, 1.0)
+    return np.asarray((rise - lifts.period * up) / winch.radius)
+
+
+def _of_the_load(depth_error: FloatArray, velocity: FloatArray, stretch: FloatArray) -> tuple[FloatArray, ...]:
+    # Beyond some metres only the side of the error: there the agent does what it has learned nearer.
+    return 4.0 * np.tanh(0.5 * depth_error), 2.0 * np.tanh(10.0 * depth_error), 5.0 * velocity, 20.0 * stretch
+
+
+def _rope_end_speed(pulley_velocity: FloatArray, lifts: Lifts, rows: Rows) -> FloatArray:
+    return np.asarray(10.0 * (pulley_velocity - lifts.winch.radius[rows] * lifts.winch.speed[rows]))
+
+
+def _of_the_lift(o: Columns, lifts: Lifts, rows: Rows) -> tuple[FloatArray, ...]:
     return (
-        mass / 5.0e4 - 1.2,
-        length / 1.0e3 - 0.8,
-        0.25 * np.sqrt(_TYPICAL_STIFFNESS / (mass * length)) - 1.0,
+        0.5 * o["pulley_heave"],
+        o["load_mass"] / 5.0e4 - 1.2,
+        o["rope_length"] / 1.0e3 - 0.8,
+        0.25 * lifts.frequency[rows] - 1.0,
     )
 
 
-def _stacked(derived: tuple[npt.NDArray[np.float64], ...]) -> Float32Array:
-    return np.asarray(np.clip(np.stack(derived, axis=1), -_LIMIT, _LIMIT), dtype=np.float32)
+def _stacked(*features: FloatArray) -> Float32Array:
+    return np.asarray(np.clip(np.stack(features, axis=1), -LIMIT, LIMIT), dtype=np.float32)

@@ -15,16 +15,17 @@ from safetensors import SafetensorError
 from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 
+from aframe_env.crane import Crane
 from aframe_env.scenario import Scenario
 from aframe_env.sensors import Sensors
 from aframe_env.structuring import strict_converter, structure
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue
-from agents.features import FeatureMaker, feature_names
+from agents.features import Features, feature_names, features_for
 from agents.network import Actor
 from agents.policy import FloatArray, Knowledge
 
-FORMAT = 1
+FORMAT = 2
 WEIGHTS = "agent.safetensors"
 CARD = "agent.json"
 
@@ -40,8 +41,6 @@ class AgentCard:
     """The sensors that it was trained with."""
     features: tuple[str, ...]
     hidden: int
-    speed_limit: float
-    """Drum speed that an action of 1 stands for, rad/s."""
     control_period: float
     """s."""
     seed: int
@@ -64,38 +63,49 @@ class LearnedPolicy:
     knows: Knowledge = field(init=False)
 
     def __post_init__(self) -> None:
-        self.name = self.card.algorithm
+        self.name = self.card.algorithm if self.card.observation == "state" else f"{self.card.algorithm} on sensors"
         self.knows = Knowledge.STATE if self.card.observation == "state" else Knowledge.SENSORS
         self._quantities = STATE if self.card.observation == "state" else SENSED
-        self._features: FeatureMaker | None = None
+        self._features: Features | None = None
+        self._cranes: Sequence[Crane] = ()
         expected = feature_names(self._quantities)
         if self.card.features != expected:
             raise InvalidValue(f"the agent's features are {self.card.features}, this version makes {expected}")
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
-        """Begin N episodes; the agent looks at nothing of them."""
+        """Begin N episodes; of the scenarios the agent looks at the crane alone."""
         if abs(control_period - self.card.control_period) > 1e-9:
             raise InvalidValue(
                 f"control_period = {control_period} s: the agent was trained for {self.card.control_period} s"
             )
+        self._cranes = [scenario.crane for scenario in scenarios]
         self._features = None
 
     def act(self, observation: npt.NDArray[np.float32], time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s; the first call since the last reset begins the agent's memory."""
-        rows = len(observation)
         if self._features is None:
-            self._features = FeatureMaker(self._quantities, rows, self.card.control_period)
-            features = self._features.start(observation, np.arange(rows))
+            self._features = features_for(len(observation), self.card.control_period, self.card.sensors)
+            inputs = self._features.start(observation, self._cranes)
         else:
-            features = self._features.advance(observation)
+            inputs = self._features.advance(observation)
         with torch.no_grad():
-            share = self.actor(torch.from_numpy(features))
-        return np.asarray(self.card.speed_limit * share[:, 0].double().numpy())
+            share = self.actor(torch.from_numpy(inputs))
+        return self._features.command(share[:, 0].double().numpy())
 
-    def predict(self, observation: npt.NDArray[np.float32], *, first: bool = False) -> npt.NDArray[np.float32]:
-        """Action (1,) rad/s for one observation (K,) of the environment; ``first``: an episode's first one."""
-        if first:
-            self._features = None
+    def predict(
+        self, observation: npt.NDArray[np.float32], *, first: bool = False, crane: Crane | None = None
+    ) -> npt.NDArray[np.float32]:
+        """Action (1,) rad/s for one observation (K,) of the environment.
+
+        ``first``: an episode's first one, with that ``crane`` (the reference crane by default).
+        """
+        if first or self._features is None:
+            self._features, self._cranes = None, [crane or Crane()]
+        if observation.shape != (len(self._quantities),):
+            raise InvalidValue(
+                f"observation of shape {observation.shape}: must be ({len(self._quantities)},), "
+                f'the environment\'s observation="{self.card.observation}"'
+            )
         return self.act(observation[None], 0.0).astype(np.float32)
 
 
@@ -114,9 +124,20 @@ def card_text(card: AgentCard) -> str:
     return json.dumps(asdict(card), indent=2, ensure_ascii=False) + "\n"
 
 
+def seeds(folder: str | Path) -> list[Path]:
+    """Folders of the agents in a folder that training with several seeds wrote, the lowest seed first."""
+    numbered = {int(path.name[5:]): path for path in Path(folder).glob("seed-*") if path.name[5:].isdigit()}
+    return [numbered[seed] for seed in sorted(numbered)]
+
+
 def load(folder: str | Path) -> LearnedPolicy:
-    """Load an agent from its folder. Raises InvalidValue where the files do not belong together."""
+    """Load an agent from its folder; that of the lowest seed where there are several.
+
+    Raises InvalidValue where there is none or its files do not belong together.
+    """
     path = Path(folder)
+    if not (path / CARD).is_file() and seeds(path):
+        path = seeds(path)[0]
     try:
         text = (path / CARD).read_text(encoding="utf-8")
         weights = (path / WEIGHTS).read_bytes()

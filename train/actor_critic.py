@@ -46,6 +46,23 @@ class CriticLatent(nn.Module):
         return torch.cat([self.perceptron(x), x, torch.clamp(x * x, max=10.0)], dim=-1)
 
 
+class ActionCriticLatent(nn.Module):
+    """As ``CriticLatent``, and the products of the action, the last input, with the others.
+
+    Where the value is close to a quadratic form, the best action is close to linear in the state: these products are
+    what it takes to say so.
+    """
+
+    def __init__(self, inputs: int, hidden: int) -> None:
+        super().__init__()
+        self.states = CriticLatent(inputs, hidden)
+        self.outputs = hidden + 3 * inputs - 1
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """Return the latent (N, hidden + 3 inputs - 1)."""
+        return torch.cat([self.states(x), torch.clamp(x[:, :-1] * x[:, -1:], -10.0, 10.0)], dim=-1)
+
+
 def _constant(inputs: int, value: float) -> nn.Linear:
     """A linear layer that begins with the same output whatever its inputs."""
     layer = nn.Linear(inputs, 1)
@@ -141,17 +158,16 @@ class TwoPathSACPolicy(SACPolicy):
         latent = self._actor_inputs + self._hidden
         actor.latent_pi = ActorLatent(self._actor_inputs, self._hidden)  # type: ignore[assignment]
         actor.mu = _constant(latent, 0.0)
-        actor.log_std = _constant(latent, -2.5)  # type: ignore[assignment]
+        actor.log_std = _constant(latent, -1.5)  # type: ignore[assignment]
         return actor
 
     def make_critic(self, features_extractor: BaseFeaturesExtractor | None = None) -> ContinuousCritic:
-        """Return two critics with linear and quadratic paths."""
+        """Return two critics with linear and quadratic paths, the action's products with the state among them."""
         critic = super().make_critic(features_extractor)
         inputs = critic.features_extractor.features_dim + 1
         for i in range(critic.n_critics):
-            network = nn.Sequential(
-                CriticLatent(inputs, self._critic_hidden), nn.Linear(self._critic_hidden + 2 * inputs, 1)
-            )
+            latent = ActionCriticLatent(inputs, self._critic_hidden)
+            network = nn.Sequential(latent, nn.Linear(latent.outputs, 1))
             critic.q_networks[i] = network
             setattr(critic, f"qf{i}", network)
         return critic

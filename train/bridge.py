@@ -1,8 +1,9 @@
 """The bridge from the native vector environment to Stable-Baselines3, with what training needs on top.
 
-Actions are shares of the winch's speed limit; observations are features; the reward is the depth error's root mean
-square over the step in place of its square, so that its gradient does not vanish near zero and a small sea weighs
-as much as a large one; an episode is cut, with the value of its last state, where the load has drifted far off.
+Actions are outputs of the agent's network and observations its inputs (see ``agents.features``); the reward is the
+depth error's root mean square over the step in place of its square, so that its gradient does not vanish near zero and
+a small sea weighs as much as a large one; an episode is cut, with the value of its last state, where the load has
+drifted far off.
 None of this is in the environment, and evaluation has none of it.
 """
 
@@ -20,11 +21,9 @@ from stable_baselines3.common.vec_env import VecEnv
 from aframe_env import task
 from aframe_env.scenario import ScenarioSource
 from aframe_env.simulation import Simulation
-from agents.features import STATE_FEATURES, FeatureMaker, state_features
+from agents.features import LIMIT, STATE_FEATURES, StateFeatures, features_for
 
 Float32Array = npt.NDArray[np.float32]
-
-_COLUMNS = {quantity.name: i for i, quantity in enumerate(task.STATE)}
 
 
 class TrainingVecEnv(VecEnv):
@@ -54,20 +53,19 @@ class TrainingVecEnv(VecEnv):
         self._horizon = max(1, round(min(horizon, episode_duration) / control_period))
         self._drift_limit = drift_limit
         self._reward_scale = reward_scale
-        self._speed_limit = float(self._simulation.action_space.high[0])
         self._rng = np.random.default_rng(seed)
         self._commands = np.zeros(rows)
-        self._actions = np.zeros((rows, 1), dtype=np.float32)
         self._no_infos: list[dict[str, Any]] = [{} for _ in range(rows)]
-        self._features = FeatureMaker(self._simulation.quantities, rows, control_period)
+        sensors = self._simulation.sensors
+        self._features = features_for(rows, control_period, sensors)
         self.actor_inputs = len(self._features.names)
         """Of the observation's features, so many are the agent's; the rest is for the critics."""
-        self._privileged = self._simulation.quantities != task.STATE
+        self._privileged = StateFeatures(rows, control_period) if sensors else None
         inputs = self.actor_inputs + (len(STATE_FEATURES) if self._privileged else 0)
         self._observations = np.zeros((rows, inputs), dtype=np.float32)
         super().__init__(
             rows,
-            spaces.Box(-20.0, 20.0, (inputs,), np.float32),
+            spaces.Box(-LIMIT, LIMIT, (inputs,), np.float32),
             spaces.Box(-1.0, 1.0, (1,), np.float32),
         )
         self._left = np.zeros(rows, dtype=np.int64)
@@ -80,11 +78,6 @@ class TrainingVecEnv(VecEnv):
     def quantities(self) -> tuple[task.Quantity, ...]:
         """What an observation of the environment consists of."""
         return self._simulation.quantities
-
-    @property
-    def speed_limit(self) -> float:
-        """Drum speed that an action of 1 stands for, rad/s."""
-        return self._speed_limit
 
     def take_reduction(self) -> float:
         """Heave reduction over all steps since the last call, exploration included.
@@ -102,8 +95,8 @@ class TrainingVecEnv(VecEnv):
         return self._observations.copy()
 
     def step_async(self, actions: Float32Array) -> None:
-        """Take the actions (rows, 1), shares of the speed limit."""
-        self._commands = self._speed_limit * np.clip(actions[:, 0].astype(np.float64), -1.0, 1.0)
+        """Take the actions (rows, 1), outputs of the agent's network."""
+        self._commands = self._features.command(actions[:, 0].astype(np.float64))
 
     def step_wait(self):  # type: ignore[no-untyped-def]
         """Advance, and restart the rows that finished."""
@@ -135,19 +128,23 @@ class TrainingVecEnv(VecEnv):
         return self._observations.copy(), rewards.astype(np.float32), finished, infos
 
     def _restart(self, rows: npt.NDArray[np.int64]) -> None:
-        self._simulation.reset_rows(rows, [self._simulation.draw(self._rng) for _ in rows])
+        drawn = [self._simulation.draw(self._rng) for _ in rows]
+        cranes = [scenario.crane for scenario, _ in drawn]
+        self._simulation.reset_rows(rows, drawn)
         self._left[rows] = self._horizon
         self._return[rows] = 0.0
         self._length[rows] = 0
-        first = self._features.start(self._simulation.observe()[rows], rows)
+        first = self._features.start(self._simulation.observe()[rows], cranes, rows)
         self._observations[rows, : self.actor_inputs] = first
         if self._privileged:
-            self._observations[rows, self.actor_inputs :] = state_features(self._simulation.state[rows], _COLUMNS)
+            state = self._simulation.state[rows].astype(np.float32)
+            self._observations[rows, self.actor_inputs :] = self._privileged.start(state, cranes, rows)
 
     def _look(self) -> None:
         self._observations[:, : self.actor_inputs] = self._features.advance(self._simulation.observe())
         if self._privileged:
-            self._observations[:, self.actor_inputs :] = state_features(self._simulation.state, _COLUMNS)
+            state = self._simulation.state.astype(np.float32)
+            self._observations[:, self.actor_inputs :] = self._privileged.advance(state)
 
     def close(self) -> None:
         """Nothing to close."""

@@ -2,7 +2,8 @@
 
 A policy is a name ("S-Ω1", or s-omega1 on a keyboard without Ω), the folder of an agent, or module:function for your
 own: see ``agents.catalogue``. The drum left alone is always there as the yardstick. Writes the table (Markdown, JSON,
-PNG) and every episode (CSV, Parquet).
+PNG), every episode (CSV, Parquet), and report.html: one page with figures, pictures and the worst cases, which opens in
+any browser, offline.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from train.config import parse, to_toml
 from train.held_out import AFTER_TRAINING, HeldOut, run_all, write
 from train.output import new_folder, user_errors, versions, write_json, write_text
 
-REPORT_PACKAGES = ("pyarrow",)
+REPORT_PACKAGES = ("jinja2", "plotly", "pyarrow")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +39,7 @@ class Options(HeldOut):
     )
     """Names, folders of agents, or module:function."""
     report: bool = True
-    """Write episodes.parquet too (extra "report")."""
+    """Write report.html and episodes.parquet too (extra "report")."""
     out: Path | None = None
     """Output folder; by default runs/evaluate-DATE-TIME."""
     overwrite: bool = False
@@ -70,9 +71,13 @@ def main() -> int:
             if options.report:
                 # Imported late: they need the extra.
                 from train.episode_table import write_episodes
+                from train.report.page import write_report
 
                 write_episodes(folder / "episodes.parquet", comparison)
                 console.print(f"every episode: {folder / 'episodes.parquet'}")
+                with console.status("writing the report"):
+                    write_report(folder / "report.html", comparison, command)
+                console.print(f"report: {folder / 'report.html'}")
         except KeyboardInterrupt:
             console.print("interrupted: the comparison is not complete")
             return 130

@@ -161,7 +161,6 @@ def to_policy(learner: Learner, options: LearningOptions) -> tuple[LearnedPolicy
         features=feature_names(learner.rows.quantities),
         hidden=options.hidden,
         squashed=actor.squashed,
-        speed_limit=learner.rows.speed_limit,
         control_period=options.control_period,
         seed=options.seed,
         timesteps=learner.model.num_timesteps,

@@ -27,8 +27,8 @@ class Options(LearningOptions):
     """λ of the generalised advantage estimate."""
     clip_range: float = 0.2
     """PPO's clipping."""
-    log_std_init: float = -2.5
-    """Logarithm of the first standard deviation of an action (a share of the speed limit)."""
+    log_std_init: float = -1.5
+    """Logarithm of the first standard deviation of an action."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -35,8 +35,8 @@ class Options(LearningOptions):
     """Updates for each step of all rows."""
     tau: float = 0.01
     """Share by which the target critics follow at each update."""
-    target_entropy: float = -3.5
-    """Of an action (a share of the speed limit), nat: -3.5 is a standard deviation of 0.007."""
+    target_entropy: float = -1.0
+    """Of an action, nat: -1 is a standard deviation of 0.09."""
     ent_coef: float = 0.01
     """Entropy's weight at the start."""
     n_steps: int = 1

@@ -45,7 +45,8 @@ class StateFeedback:
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for observations (N, 14) of the full state."""
         if self._lifts is None:
-            self._lifts = Lifts(self._scenarios, self._period, STATE, observation)
+            self._lifts = Lifts(len(observation), self._period, STATE)
+            self._lifts.start([s.crane for s in self._scenarios], observation)
             self._regulator = self._lifts.regulator(self.gains)
         lifts, period = self._lifts, self._period
         winch, o = lifts.winch, lifts.columns(observation)
@@ -88,10 +89,11 @@ class SensorFeedback:
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for readings (N, 10)."""
         if self._lifts is None:
-            lifts = self._lifts = Lifts(self._scenarios, self._period, SENSED, observation)
+            lifts = self._lifts = Lifts(len(observation), self._period, SENSED)
+            o = lifts.start([s.crane for s in self._scenarios], observation)
             self._regulator = lifts.regulator(self.gains)
-            model, o = lifts.model(self.gains.damping_ratio), lifts.columns(observation)
-            self._observer = Observer(lifts, model, self.delay, PolynomialPredictor(), o)
+            self._observer = Observer(lifts, self.gains.damping_ratio, self.delay, PolynomialPredictor())
+            self._observer.start(o)
         else:
             lifts = self._lifts
             self._observer.advance(self._turned, lifts.columns(observation))

@@ -89,7 +89,8 @@ class InverseDynamics:
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for observations (N, 14) of the full state."""
         if self._lifts is None:
-            self._lifts = Lifts(self._scenarios, self._period, STATE, observation)
+            self._lifts = Lifts(len(observation), self._period, STATE)
+            self._lifts.start([s.crane for s in self._scenarios], observation)
             self._regulator = self._lifts.regulator(self.gains)
             now = self._rope.now()
             self._rope.advance()

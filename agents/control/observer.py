@@ -7,13 +7,15 @@ from typing import Protocol
 import numpy as np
 
 from agents.control.regulator import Columns, Lifts
-from agents.control.rope import RopeModel
-from agents.estimation import DRUM_RADIUS, Estimate, Estimator, Readings
-from agents.policy import FloatArray
+from agents.estimation import ALL, DRUM_RADIUS, Estimate, Estimator, FloatArray, Readings, Rows
 
 
 class Predictor(Protocol):
     """Foretells the pulley's vertical motion from the readings of its velocity."""
+
+    def start(self, heave_rate: FloatArray, estimate: Estimate, rows: Rows) -> None:
+        """Begin in these rows with a first reading (n,) m/s; ``estimate`` is that of all rows."""
+        ...
 
     def advance(self, heave_rate: FloatArray, estimate: Estimate) -> None:
         """Take a reading (N,) m/s, and what the estimator makes of all readings, a control step later."""
@@ -32,6 +34,10 @@ class PolynomialPredictor:
     """Carries on with the velocity, acceleration and jerk that the estimator finds: good for a fraction of a wave."""
 
     _estimate: Estimate
+
+    def start(self, heave_rate: FloatArray, estimate: Estimate, rows: Rows) -> None:
+        """Take the estimate."""
+        self._estimate = estimate
 
     def advance(self, heave_rate: FloatArray, estimate: Estimate) -> None:
         """Take the estimate."""
@@ -55,34 +61,42 @@ class Observer:
     makes of the pulleys' motion.
     """
 
-    def __init__(self, lifts: Lifts, model: RopeModel, delay: float, predictor: Predictor, o: Columns) -> None:
-        """Begin with the first readings; ``delay`` in s, rounded to control steps."""
+    def __init__(self, lifts: Lifts, damping_ratio: float, delay: float, predictor: Predictor) -> None:
+        """``damping_ratio`` of the loads' bobbing, share of critical; ``delay`` in s, rounded to control steps."""
         self._lifts = lifts
-        self._model = model
+        self._damping_ratio = damping_ratio
         self._predictor = predictor
         rows = len(lifts.frequency)
+        self.model = lifts.model(damping_ratio)
         self._estimator = Estimator(rows, lifts.period)
-        self._estimator.start(self._readings(o), slice(None))
         self._turns = np.zeros((round(delay / lifts.period), rows))
         """(steps of delay, N) how far the drums have turned since the moment that the readings speak of, rad."""
-        self._predict(o)
+
+    def start(self, o: Columns, rows: Rows = ALL) -> None:
+        """Begin lifts, as ``lifts`` has, in these rows with the first readings (n,)."""
+        self.model.replace(rows, self._lifts.model(self._damping_ratio, rows))
+        self._estimator.start(self._readings(o, rows), rows)
+        self._turns[:, rows] = 0.0
+        self.estimate = self._estimator.estimate(ALL)
+        self._predictor.start(o["pulley_velocity_z"], self.estimate, rows)
 
     def advance(self, turned: FloatArray, o: Columns) -> None:
         """Take the readings a control step later, during which the drums turned by ``turned`` (N,) rad."""
         self._turns = np.concatenate([self._turns, turned[None]])[1:] if len(self._turns) else self._turns
-        self._estimator.advance(self._readings(o))
-        self._predict(o)
+        self._estimator.advance(self._readings(o, ALL))
+        self.estimate = self._estimator.estimate(ALL)
+        self._predictor.advance(o["pulley_velocity_z"], self.estimate)
 
     def state(self) -> FloatArray:
         """State z (N, 4) of the rope's model, now."""
-        estimate, period, radius = self._estimate, self._lifts.period, self._lifts.winch.radius
+        estimate, period, radius = self.estimate, self._lifts.period, self._lifts.winch.radius
         late = len(self._turns)
         rises = np.diff(self._predictor.path(period * np.arange(late + 1.0)), axis=0)
         still = np.zeros(len(radius))
         z = np.stack([estimate.depth_error, estimate.load_velocity, estimate.depth_error + estimate.stretch, still], 1)
         for rise, turn in zip(rises, self._turns, strict=True):
             z[:, 3] = 0.0
-            z = self._model.advance(z, (rise - radius * turn) / period)
+            z = self.model.advance(z, (rise - radius * turn) / period)
         z[:, 3] = self._predictor.rate(np.array([period * late]))[0] - radius * self._lifts.winch.speed
         return z
 
@@ -91,15 +105,11 @@ class Observer:
         times = self._lifts.period * np.arange(len(self._turns), len(self._turns) + steps + 1.0)
         return np.diff(self._predictor.path(times), axis=0)
 
-    def _predict(self, o: Columns) -> None:
-        self._estimate = self._estimator.estimate(slice(None))
-        self._predictor.advance(o["pulley_velocity_z"], self._estimate)
-
-    def _readings(self, o: Columns) -> Readings:
+    def _readings(self, o: Columns, rows: Rows) -> Readings:
         return Readings(
             heave_rate=o["pulley_velocity_z"],
-            drum_angle=o["drum_angle"] * self._lifts.winch.radius / DRUM_RADIUS,
-            stretch=self._lifts.stretch(o),
-            load_acceleration=self._lifts.load_acceleration(o),
+            drum_angle=o["drum_angle"] * self._lifts.winch.radius[rows] / DRUM_RADIUS,
+            stretch=self._lifts.stretch(o, rows),
+            load_acceleration=self._lifts.load_acceleration(o, rows),
             depth_error=o["depth_error"],
         )

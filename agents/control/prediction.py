@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag, solve_discrete_are
 
-from agents.estimation import Estimate
-from agents.policy import FloatArray
+from agents.estimation import Estimate, FloatArray, Rows
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +50,10 @@ class BankPredictor:
         self._gain = gain[::2] + 1j * gain[1::2]
         self._state = np.zeros((rows, bank.bands), dtype=np.complex128)
         """The heave rate is the sum of the real parts, m/s."""
+
+    def start(self, heave_rate: FloatArray, estimate: Estimate, rows: Rows) -> None:
+        """Begin in these rows with a first reading (n,) m/s: the ship has been at rest."""
+        self._state[rows] = heave_rate[:, None] * self._gain
 
     def advance(self, heave_rate: FloatArray, estimate: Estimate) -> None:
         """Take a reading (N,) m/s of the heave rate, a control step later."""

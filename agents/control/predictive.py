@@ -111,12 +111,14 @@ class PredictiveControl:
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for readings (N, 10)."""
         if self._lifts is None:
-            lifts = self._lifts = Lifts(self._scenarios, self._period, SENSED, observation)
-            self._model = lifts.model(self.damping_ratio)
+            lifts = self._lifts = Lifts(len(observation), self._period, SENSED)
+            o = lifts.start([s.crane for s in self._scenarios], observation)
+            predictor = BankPredictor(len(observation), self._period)
+            self._observer = Observer(lifts, self.damping_ratio, self.delay, predictor)
+            self._observer.start(o)
+            self._model = self._observer.model
             self._k = self._model.gains(self.effort)
             self._problems = {}
-            predictor = BankPredictor(len(observation), self._period)
-            self._observer = Observer(lifts, self._model, self.delay, predictor, lifts.columns(observation))
         else:
             lifts = self._lifts
             self._observer.advance(self._turned, lifts.columns(observation))

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.crane import GRAVITY
-from aframe_env.scenario import Scenario
+from aframe_env.crane import GRAVITY, Crane
 from aframe_env.task import Quantity
 from aframe_env.validation import InvalidValue, require_number
 from agents.control.rope import RopeModel
 from agents.control.winch import WinchModel
-from agents.policy import FloatArray
+from agents.estimation import ALL, FloatArray, Rows
 
 Observation = npt.NDArray[np.float32]
 Columns = dict[str, FloatArray]
@@ -67,22 +66,21 @@ class Regulator:
 class Lifts:
     """Winches, loads and ropes of N rows, as far as a policy may know them: the crane, and what it observes."""
 
-    def __init__(
-        self,
-        scenarios: Sequence[Scenario],
-        control_period: float,
-        quantities: tuple[Quantity, ...],
-        observation: Observation,
-    ) -> None:
-        """Of the scenarios only the crane is looked at; ``observation`` (N, K) is the first."""
+    def __init__(self, rows: int, control_period: float, quantities: tuple[Quantity, ...]) -> None:
         self.period = control_period
-        self.winch = WinchModel(scenarios, control_period)
+        self.winch = WinchModel(rows, control_period)
         self._columns = {q.name: i for i, q in enumerate(quantities)}
-        self._axial_stiffness = np.array([s.crane.rope.axial_stiffness for s in scenarios])
+        self._axial_stiffness, self._weight, self.frequency = np.ones((3, rows))
+        """``frequency``: of the loads' bobbing on their ropes, (N,) rad/s."""
+
+    def start(self, cranes: Sequence[Crane], observation: Observation, rows: Rows = ALL) -> Columns:
+        """Begin lifts with these cranes in these rows; return the first observation (n, K) by its quantities' names."""
+        self.winch.start(cranes, rows)
         o = self.columns(observation)
-        self._weight = o["load_mass"] * GRAVITY
-        self.frequency = np.sqrt(self._axial_stiffness / (o["rope_length"] * o["load_mass"]))
-        """Of the loads' bobbing on their ropes, (N,) rad/s."""
+        self._axial_stiffness[rows] = [crane.rope.axial_stiffness for crane in cranes]
+        self._weight[rows] = o["load_mass"] * GRAVITY
+        self.frequency[rows] = np.sqrt(self._axial_stiffness[rows] / (o["rope_length"] * o["load_mass"]))
+        return o
 
     def columns(self, observation: Observation) -> Columns:
         """The observation (N, K) by the names of its quantities."""
@@ -93,9 +91,9 @@ class Lifts:
             )
         return {name: observation[:, i].astype(np.float64) for name, i in self._columns.items()}
 
-    def model(self, damping_ratio: float) -> RopeModel:
+    def model(self, damping_ratio: float, rows: Rows = ALL) -> RopeModel:
         """Linear model of the loads and ropes."""
-        return RopeModel.of(self.frequency, damping_ratio, self.period)
+        return RopeModel.of(self.frequency[rows], damping_ratio, self.period)
 
     def regulator(self, gains: Gains) -> Regulator:
         """Feedback law for the loads and ropes."""
@@ -103,10 +101,14 @@ class Lifts:
         k = self.model(gains.damping_ratio).gains(gains.effort)
         return Regulator(k, acceleration / self.frequency**2, acceleration)
 
-    def stretch(self, o: Columns) -> FloatArray:
+    def stretch(self, o: Columns, rows: Rows = ALL) -> FloatArray:
         """Stretch (N,) m of the rope beyond that under the load's weight, as the tension tells."""
-        return np.asarray((o["rope_tension"] - self._weight) * o["rope_length"] / self._axial_stiffness)
+        return self.stretch_under(o["rope_tension"] - self._weight[rows], o, rows)
 
-    def load_acceleration(self, o: Columns) -> FloatArray:
+    def stretch_under(self, force: FloatArray, o: Columns, rows: Rows = ALL) -> FloatArray:
+        """Stretch (N,) m of the rope by a force (N,) N."""
+        return np.asarray(force * o["rope_length"] / self._axial_stiffness[rows])
+
+    def load_acceleration(self, o: Columns, rows: Rows = ALL) -> FloatArray:
         """Vertical acceleration (N,) m/s² of the load, as the tension tells."""
-        return np.asarray((o["rope_tension"] / self._weight - 1.0) * GRAVITY)
+        return np.asarray((o["rope_tension"] / self._weight[rows] - 1.0) * GRAVITY)

@@ -10,10 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import expm, solve_discrete_are
 
-FloatArray = npt.NDArray[np.float64]
+from agents.estimation import FloatArray, Rows
 
 
 @dataclass(frozen=True)
@@ -38,6 +37,10 @@ class RopeModel:
         a = expm(rate * period)
         # A change of p at the start of the step is as good as a p that was there before it.
         return cls(a, a[:, :, 3].copy())
+
+    def replace(self, rows: Rows, other: RopeModel) -> None:
+        """Put the rows of another model in the place of these."""
+        self.a[rows], self.b[rows] = other.a, other.b
 
     def row(self, index: int) -> RopeModel:
         """Model of one row."""

@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from aframe_env.dynamics.compiling import kernel
+from aframe_env.crane import Crane
+from aframe_env.dynamics.compiling import kernel, scalar
 from aframe_env.dynamics.winch import drum_state, plan
-from aframe_env.scenario import Scenario
-
-FloatArray = npt.NDArray[np.float64]
+from agents.estimation import ALL, FloatArray, Rows
 
 _BISECTIONS = 48  # a hair of the speed range: below 1e-13 rad/s
 
@@ -21,59 +20,75 @@ _BISECTIONS = 48  # a hair of the speed range: below 1e-13 rad/s
 class WinchModel:
     """The winches of N rows, without their limit switches: commands for wanted turns, and reckoned drum speeds."""
 
-    def __init__(self, scenarios: Sequence[Scenario], control_period: float) -> None:
-        winches = [s.crane.winch for s in scenarios]
-        self.radius = np.array([w.drum_radius for w in winches])
-        """(N,) m."""
-        self.max_speed = np.array([w.max_speed for w in winches])
-        """(N,) rad/s."""
-        self.max_acceleration = np.array([w.max_acceleration for w in winches])
-        """(N,) rad/s²."""
-        self._lag = np.array([w.lag for w in winches])
+    def __init__(self, rows: int, control_period: float) -> None:
+        self.radius, self.max_speed, self.max_acceleration, self._lag = np.ones((4, rows))
+        """(N,) m, rad/s, rad/s²."""
         self._period = control_period
-        self.speed = np.zeros(len(winches))
+        self.speed = np.zeros(rows)
         """(N,) rad/s, reckoned from the commands since the start; a lift begins with the drum at rest."""
+
+    def start(self, cranes: Sequence[Crane], rows: Rows = ALL) -> None:
+        """Begin lifts with these cranes in these rows."""
+        winches = [crane.winch for crane in cranes]
+        self.radius[rows] = [w.drum_radius for w in winches]
+        self.max_speed[rows] = [w.max_speed for w in winches]
+        self.max_acceleration[rows] = [w.max_acceleration for w in winches]
+        self._lag[rows] = [w.lag for w in winches]
+        self.speed[rows] = 0.0
 
     def command(self, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Commands (N,) rad/s that turn the drums by ``turn`` (N,) rad, or as near as may be, and how far they turn.
 
         The reckoned speed is carried to the end of the control step.
         """
-        command, turned = np.empty_like(turn), np.empty_like(turn)
-        _kernel()(turn, self.max_speed, self.max_acceleration, self._lag, self._period, self.speed, command, turned)
-        return command, turned
+        command = self.find(turn)
+        return command, self.turn(command)
+
+    def find(self, turn: FloatArray) -> FloatArray:
+        """Commands (N,) rad/s that would turn the drums by ``turn`` (N,) rad, or as near as may be."""
+        command = np.empty_like(turn)
+        _kernels().invert(self.speed, self.max_speed, self.max_acceleration, self._lag, self._period, turn, command)
+        return command
+
+    def turn(self, command: FloatArray) -> FloatArray:
+        """How far the drums turn (N,) rad at these commands (N,) rad/s; the reckoned speed is carried on."""
+        turned = np.empty_like(command)
+        limited = np.clip(command, -self.max_speed, self.max_speed)
+        _kernels().follow(self.speed, self.max_acceleration, self._lag, self._period, limited, turned)
+        return turned
+
+
+class _Kernels(NamedTuple):
+    invert: Callable[..., None]
+    follow: Callable[..., None]
+
+
+@scalar
+def _advance(command: float, speed: float, acceleration: float, lag: float, period: float) -> tuple[float, float]:
+    """Turn [rad] and speed [rad/s] at the end of a control step."""
+    way, ramp, error, _, _ = plan(command, speed, acceleration, lag, period)
+    end = error * math.exp((ramp - period) / lag) if lag > 0.0 and ramp < period else error
+    return drum_state(period, 0.0, speed, command, acceleration, lag, way, ramp, error, end, -math.inf, math.inf)
 
 
 @cache
-def _kernel() -> Callable[..., None]:
-
+def _kernels() -> _Kernels:
     @kernel
-    def invert(turn, limit, acceleration, lag, period, speed, command, turned):  # type: ignore[no-untyped-def]
+    def invert(speed, limit, acceleration, lag, period, turn, command):  # type: ignore[no-untyped-def]
         for i in range(turn.shape[0]):
             low, high = -limit[i], limit[i]
-            angle, after = 0.0, 0.0
             for _ in range(_BISECTIONS):
                 middle = 0.5 * (low + high)
-                way, ramp, error, _, _ = plan(middle, speed[i], acceleration[i], lag[i], period)
-                end = error * math.exp((ramp - period) / lag[i]) if lag[i] > 0.0 and ramp < period else error
-                angle, after = drum_state(
-                    period,
-                    0.0,
-                    speed[i],
-                    middle,
-                    acceleration[i],
-                    lag[i],
-                    way,
-                    ramp,
-                    error,
-                    end,
-                    -np.inf,
-                    np.inf,
-                )
+                angle, _speed = _advance(middle, speed[i], acceleration[i], lag[i], period)
                 if angle < turn[i]:
                     low = middle
                 else:
                     high = middle
-            command[i], turned[i], speed[i] = middle, angle, after
+            command[i] = middle
 
-    return invert
+    @kernel
+    def follow(speed, acceleration, lag, period, command, turned):  # type: ignore[no-untyped-def]
+        for i in range(command.shape[0]):
+            turned[i], speed[i] = _advance(command[i], speed[i], acceleration[i], lag[i], period)
+
+    return _Kernels(invert, follow)

@@ -65,7 +65,8 @@ def test_a_command_turns_the_drum_as_far_as_wanted(lag):
     """Against the environment's own winch."""
     scenario = sinusoid(crane=Crane(winch=Winch(lag=lag)))
     rng = np.random.default_rng(2)
-    winch = WinchModel([scenario], PERIOD)
+    winch = WinchModel(1, PERIOD)
+    winch.start([scenario.crane])
     turns, actual = [], []
 
     class Turn:

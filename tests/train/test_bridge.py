@@ -7,8 +7,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from aframe_env import ScenarioDistribution
 from aframe_env.env import AFrameHeaveEnv
-from aframe_env.task import STATE
-from agents.features import STATE_FEATURES, FeatureMaker
+from agents.features import STATE_FEATURES, features_for
 from train import ppo, sac
 from train.bridge import TrainingVecEnv
 
@@ -28,26 +27,23 @@ def bridge(rows=3, **changes):
     return TrainingVecEnv(rows, **arguments)
 
 
-def state_features(observation):
-    return FeatureMaker(STATE, 1, 0.1).start(observation[None], np.array([0]))[0]
-
-
 def test_rows_are_the_environments():
     rows = bridge(horizon=60.0)
     observed = rows.reset()
     envs = []
     for i, scenario in enumerate(rows._simulation.scenarios):
-        env = AFrameHeaveEnv(scenario=scenario)
+        env, features = AFrameHeaveEnv(scenario=scenario), features_for(1, 0.1, None)
         first, _ = env.reset(seed=0)
-        np.testing.assert_array_equal(state_features(first), observed[i])
-        envs.append(env)
+        np.testing.assert_array_equal(features.start(first[None], [scenario.crane])[0], observed[i])
+        envs.append((env, features))
     actions = np.array([[0.1], [-0.2], [0.0]], dtype=np.float32)
     for _ in range(8):
         observed, rewards, finished, _ = rows.step(actions)
         assert not finished.any()
-        for i, env in enumerate(envs):
-            want, reward, _, _, _ = env.step(np.array([4.0 * float(actions[i, 0])], dtype=np.float32))
-            np.testing.assert_allclose(observed[i], state_features(want), atol=2e-5)
+        for i, (env, features) in enumerate(envs):
+            command = features.command(actions[i].astype(np.float64))
+            want, reward, _, _, _ = env.step(command.astype(np.float32))
+            np.testing.assert_allclose(observed[i], features.advance(want[None])[0], atol=2e-5)
             # The reward is the root mean square over the step, in place of the mean square.
             assert rewards[i] == pytest.approx(-np.sqrt(-reward / 0.1), rel=1e-4, abs=1e-6)
 

@@ -28,6 +28,15 @@ def test_the_committed_agent_is_as_good_as_the_results_say(model, tmp_path, monk
     assert json.loads((out / "run.json").read_text())["command"].startswith("python -m train.evaluate --policies")
 
 
+def test_the_report_is_written_beside_the_episodes(tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    assert (
+        command(monkeypatch, "--policies", "inverse dynamics", "--scenarios", 2, "--privileged", 0, "--out", out) == 0
+    )
+    assert (out / "episodes.parquet").is_file()
+    assert "--policies &#39;inverse dynamics&#39; --scenarios 2" in (out / "report.html").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -5,6 +5,7 @@ import pytest
 
 from agents.learned import load
 from train import ppo
+from train.held_out import AFTER_TRAINING
 
 TINY = ("--timesteps", 512, "--n-envs", 4, "--n-steps", 16, "--batch-size", 64, "--n-epochs", 1)
 
@@ -24,7 +25,7 @@ def test_a_run_from_start_to_comparison(tmp_path, monkeypatch):
     assert run["versions"]["torch"]
     assert json.loads((out / "metrics.json").read_text())["timesteps"] >= 512
     rows = {row["policy"]: row for row in json.loads((out / "comparison.json").read_text(encoding="utf-8"))}
-    assert list(rows) == ["drum still", "PPO", "S-Ω1", "H-Ω1", "S-Ω1 for each scenario", "H-Ω1 for each scenario"]
+    assert list(rows) == ["drum still", "PPO", *AFTER_TRAINING]
     assert rows["S-Ω1"]["scenarios"] == 3
     assert rows["S-Ω1 for each scenario"]["scenarios"] == 1
     assert "privileged" in rows["S-Ω1 for each scenario"]["knows"]

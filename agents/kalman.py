@@ -1,0 +1,192 @@
+"""Kalman filters that tell agents, from their sensors, where the load is and where the pulley goes.
+
+Dead reckoning by the heave rate drifts by centimetres, and the depth sensor is too coarse and too slow to hold it. But
+a ship in waves moves within a band of frequencies: ``WaveFilter`` holds its heave as a bank of oscillators of that
+band (after Küchler, Mahl, Neupert, Schneider, Sawodny, IEEE/ASME Transactions on Mechatronics, 2011, with fixed bands
+in place of modes that are identified on line), which also tell the motion to come. ``RopeFilter`` follows the load as
+it bobs on its rope.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import block_diag
+
+from agents.control.rope import RopeModel
+from agents.estimation import ALL, FloatArray, Rows
+
+ComplexArray = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True, kw_only=True)
+class WaveBank:
+    """The oscillators, and what the filter counts on."""
+
+    lowest: float = 0.3
+    """rad/s."""
+    highest: float = 1.6
+    """rad/s."""
+    bands: int = 40
+    damping: float = 0.002
+    """Rate at which an oscillator forgets, 1/s."""
+    variance: float = 0.06
+    """Of the heave rate, spread evenly over the bands, m²/s²."""
+    build_up: float = 10.0
+    """Time over which the motion comes up to that variance at the start of a lift, s."""
+    rate_noise: float = 0.01
+    """Standard deviation of a reading of the heave rate, m/s."""
+    depth_noise: float = 0.06
+    """Standard deviation of a reading of the depth beside what else is estimated, m."""
+    offset_drift: float = 1e-7
+    """Variance by which the offset between heave and depth grows, m²/s."""
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Gains of K control steps; the last ones, a period of the depth sensor, are those of all steps to come."""
+
+    rate: ComplexArray
+    """(K, bands + 1) of a reading of the heave rate, on the oscillators and on the offset."""
+    depth: ComplexArray
+    """(K, bands + 1) of a reading of the depth; zero where there is none."""
+    hold: int
+    """Control steps between two readings of the depth."""
+
+    def index(self, step: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+        """Which gains hold at these steps since the start of a lift."""
+        beyond = len(self.rate) - self.hold
+        return np.where(step < beyond, step, beyond + (step - beyond) % self.hold)
+
+
+@cache
+def schedule(bank: WaveBank, period: float, hold: int) -> Schedule:
+    """Gains of the Kalman filter for a ship at rest at the start, by the recursion of its covariance over 60 s."""
+    steps = hold * round(60.0 / period / hold) + hold
+    exponent = _exponents(bank)
+    turn = np.exp(exponent * period)
+    a = block_diag(*(np.array([[t.real, -t.imag], [t.imag, t.real]]) for t in turn), np.eye(1))
+    rate = np.append(np.tile([1.0, 0.0], bank.bands), 0.0)
+    inverse = 1.0 / exponent
+    depth = np.append(np.stack([inverse.real, -inverse.imag], axis=1).ravel(), 1.0)
+    moving = np.arange(0, 2 * bank.bands, 2)  # it is the rates that are stirred: a displacement does not jump
+    share = bank.variance / bank.bands
+    covariance = np.diag(np.append(np.zeros(2 * bank.bands), 1e-6))
+    gains = np.zeros((2, steps, 2 * bank.bands + 1))
+    for step in range(1, steps):
+        covariance = a @ covariance @ a.T
+        rising = step * period < bank.build_up
+        grow = 2.0 * period / bank.build_up if rising else -np.expm1(-2.0 * bank.damping * period)
+        covariance[moving, moving] += 2.0 * share * grow
+        covariance[-1, -1] += bank.offset_drift * period
+        for kind, row, noise in ((0, rate, bank.rate_noise), (1, depth, bank.depth_noise)):
+            if kind == 0 or step % hold == 0:
+                seen = covariance @ row
+                gains[kind, step] = seen / (row @ seen + noise**2)
+                covariance -= np.outer(gains[kind, step], seen)
+    paired = gains[..., :-1:2] + 1j * gains[..., 1::2]
+    both = np.concatenate([paired, gains[..., -1:]], axis=-1)
+    return Schedule(both[0], both[1], hold)
+
+
+def _exponents(bank: WaveBank) -> ComplexArray:
+    return np.asarray(-bank.damping + 1j * np.linspace(bank.lowest, bank.highest, bank.bands), dtype=np.complex128)
+
+
+class WaveFilter:
+    """The pulley's heave, and what it will be, for N rows."""
+
+    def __init__(self, rows: int, control_period: float, hold: int, bank: WaveBank | None = None) -> None:
+        """``hold``: control steps between two readings of the depth."""
+        bank = bank or WaveBank()
+        self._schedule = schedule(bank, control_period, hold)
+        self._exponent = _exponents(bank)
+        self._turn = np.append(np.exp(self._exponent * control_period), 1.0)
+        self._state = np.zeros((rows, bank.bands + 1), dtype=np.complex128)
+        """The heave rate is the sum of the real parts of all but the last, m/s; the last is the offset, m."""
+        self._step = np.zeros(rows, dtype=np.int64)
+
+    def start(self, rows: Rows = ALL) -> None:
+        """Begin in these rows with a ship at rest."""
+        self._state[rows] = 0.0
+        self._step[rows] = 0
+
+    def advance(self, heave_rate: FloatArray) -> None:
+        """Take a reading (N,) m/s of the pulley's heave rate, a control step later."""
+        self._step += 1
+        self._state *= self._turn
+        miss = heave_rate - self._state[:, :-1].real.sum(axis=1)
+        self._state += miss[:, None] * self._schedule.rate[self._schedule.index(self._step)]
+
+    def correct(self, miss: FloatArray) -> None:
+        """Take what a reading of the depth misses (N,) m, heeded in the steps that have one."""
+        self._state += miss[:, None] * self._schedule.depth[self._schedule.index(self._step)]
+
+    def heave(self) -> FloatArray:
+        """Rise (N,) m of the pulley since the start, and the offset."""
+        return np.asarray((self._state[:, :-1] / self._exponent).real.sum(axis=1) + self._state[:, -1].real)
+
+    def rate(self, times: FloatArray) -> FloatArray:
+        """Velocity (T, N) m/s of the pulley, ``times`` (T,) s after the moment that the reading speaks of."""
+        return self._sum(np.exp(np.outer(times, self._exponent)))
+
+    def path(self, times: FloatArray) -> FloatArray:
+        """Rise (T, N) m of the pulley since that moment."""
+        return self._sum(np.expm1(np.outer(times, self._exponent)) / self._exponent)
+
+    def _sum(self, factors: ComplexArray) -> FloatArray:
+        # Row by row in the same order, whatever the batch: a sum, not a matrix product.
+        return np.asarray((factors[:, None, :] * self._state[None, :, :-1]).real.sum(axis=2))
+
+
+ACCELERATION_NOISE = 0.02
+"""m/s², of the load beside what its bobbing explains."""
+
+
+class RopeFilter:
+    """The load on its rope, x = (e, v, q) of N rows: depth error, its rate, and where the rope's end would hold it.
+
+    Only e - q and v are of use: q is dead-reckoned and drifts.
+    """
+
+    def __init__(self, rows: int, rate_noise: float) -> None:
+        """``rate_noise`` of a reading of the heave rate, m/s."""
+        self._rate_noise = rate_noise
+        self._a, self._b = np.zeros((rows, 3, 3)), np.zeros((rows, 3))
+        self._stir, self._covariance = np.zeros((rows, 3, 3)), np.zeros((rows, 3, 3))
+        self._noise = np.ones(rows)
+        self._x = np.zeros((rows, 3))
+
+    def start(self, model: RopeModel, period: float, stretch_noise: FloatArray, rows: Rows = ALL) -> None:
+        """Begin in these rows with loads at rest; ``stretch_noise`` (n,) of a reading of the stretch, m."""
+        self._a[rows], self._b[rows] = model.a[:, :3, :3], model.b[:, :3]
+        b = model.b[:, :3]
+        stir = self._rate_noise**2 * b[:, :, None] * b[:, None, :]
+        stir[:, 1, 1] += (ACCELERATION_NOISE * period) ** 2
+        self._stir[rows] = stir
+        self._covariance[rows] = 1e-4 * np.eye(3)
+        self._noise[rows] = stretch_noise**2
+        self._x[rows] = 0.0
+
+    def advance(self, speed: FloatArray, stretch: FloatArray) -> None:
+        """Take the mean speed (N,) m/s of the rope's end over a control step, and the stretch (N,) m at its end."""
+        a = self._a
+        x = (a @ self._x[:, :, None])[:, :, 0] + self._b * speed[:, None]
+        p = a @ self._covariance @ a.transpose(0, 2, 1) + self._stir
+        seen = p[:, :, 2] - p[:, :, 0]
+        gain = seen / (seen[:, 2] - seen[:, 0] + self._noise)[:, None]
+        self._x = x + gain * (stretch - (x[:, 2] - x[:, 0]))[:, None]
+        self._covariance = p - gain[:, :, None] * seen[:, None, :]
+
+    @property
+    def stretch(self) -> FloatArray:
+        """Of the rope beyond that under the load's weight, (N,) m."""
+        return np.asarray(self._x[:, 2] - self._x[:, 0])
+
+    @property
+    def load_velocity(self) -> FloatArray:
+        """(N,) m/s."""
+        return np.asarray(self._x[:, 1])

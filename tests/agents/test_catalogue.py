@@ -1,0 +1,107 @@
+import json
+
+import numpy as np
+import pytest
+import torch
+
+from aframe_env import InvalidValue, ScenarioDistribution
+from agents import load
+from agents.catalogue import CATALOGUE, Setting, choose, choose_all, slug
+from agents.features import STATE_FEATURES
+from agents.learned import CARD, WEIGHTS, AgentCard, card_text, digest, serialise
+from agents.network import Actor
+from agents.policy import Knowledge
+from agents.rollout import held_out_scenarios
+
+
+def write_agent(folder, seed):
+    torch.manual_seed(seed)
+    weights = serialise(Actor(len(STATE_FEATURES), 4))
+    card = AgentCard(
+        algorithm="PPO",
+        observation="state",
+        sensors=None,
+        features=STATE_FEATURES,
+        hidden=4,
+        control_period=0.1,
+        seed=seed,
+        timesteps=1,
+        versions={},
+        sha256=digest(weights),
+    )
+    folder.mkdir(parents=True)
+    (folder / WEIGHTS).write_bytes(weights)
+    (folder / CARD).write_text(card_text(card))
+
+
+def setting(count=2):
+    distribution = ScenarioDistribution()
+    return Setting(
+        scenarios=held_out_scenarios(distribution, count),
+        nominal=distribution.nominal(),
+        episode_duration=10.0,
+        observation="state",
+    )
+
+
+def test_a_folder_of_seeds_is_all_of_its_agents(tmp_path):
+    for seed in (0, 2, 10):
+        write_agent(tmp_path / "ppo" / f"seed-{seed}", seed)
+    choices = choose_all([str(tmp_path / "ppo"), "drum-still"])
+    assert [choice.name for choice in choices] == ["PPO, seed 0", "PPO, seed 2", "PPO, seed 10", "drum still"]
+    built = [choice.build(setting()) for choice in choices[:3]]
+    assert [policy.card.seed for policy in built] == [0, 2, 10]
+    assert load(tmp_path / "ppo").card.seed == 0
+
+
+def test_agents_of_one_name_and_seed_are_told_apart_by_their_folders(tmp_path):
+    folders = [tmp_path / name / "seed-1" for name in ("a", "b")]
+    for folder in folders:
+        write_agent(folder, 1)
+    names = [choice.name for choice in choose_all([str(folder) for folder in folders])]
+    assert names == [f"PPO, seed 1, {folder}" for folder in folders]
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_every_name_can_be_typed_and_chosen(name):
+    typed = slug(name)
+    assert typed.isascii()
+    assert choose(typed).name == name
+
+
+@pytest.mark.parametrize(
+    "name", ["feed-forward + feedback (state)", "feed-forward + feedback", "inverse dynamics", "predictive control"]
+)
+def test_the_laws_are_there_with_what_they_know(name):
+    policy = choose(name).build(setting())
+    assert policy.name == name
+    assert policy.knows in (Knowledge.STATE, Knowledge.SENSORS, Knowledge.FUTURE)
+
+
+def push(observation):
+    return 0.5 * observation[:, 0]
+
+
+def late_push(observation, time):
+    return np.full(len(observation), time)
+
+
+def test_anybodys_function_is_a_policy():
+    policy = choose(f"{__name__}:push").build(setting())
+    policy.reset(setting().scenarios, 0.1)
+    np.testing.assert_array_equal(policy.act(np.ones((2, 14), dtype=np.float32), 0.0), [0.5, 0.5])
+    policy = choose(f"{__name__}:late_push").build(setting())
+    policy.reset(setting().scenarios, 0.1)
+    np.testing.assert_array_equal(policy.act(np.ones((2, 14), dtype=np.float32), 3.0), [3.0, 3.0])
+
+
+@pytest.mark.parametrize("text", ["absent", "json:absent", f"{__name__}:CATALOGUE"])
+def test_what_is_no_policy_is_refused(text):
+    with pytest.raises(InvalidValue, match="policy = "):
+        choose(text)
+
+
+def test_a_folder_without_an_agent_is_refused(tmp_path):
+    (tmp_path / "note.json").write_text(json.dumps({}))
+    with pytest.raises(InvalidValue, match="no agent in this folder"):
+        choose(str(tmp_path))

@@ -1,0 +1,126 @@
+import numpy as np
+import pytest
+
+from aframe_env import Crane, HarmonicMotion, Scenario, ScenarioDistribution
+from aframe_env.sensors import Sensors
+from aframe_env.simulation import Simulation
+from agents.features import AUTHORITY, LIMIT, SENSED_FEATURES, STATE_FEATURES, features_for
+
+PERIOD = 0.1
+
+
+def ran(observation, rows=12, steps=400, seed=8):
+    """Features and full state, (steps, rows, …), in random seas with the drum turning at random."""
+    rng = np.random.default_rng(seed)
+    simulation = Simulation(rows, observation=observation, control_period=PERIOD)
+    drawn = [simulation.draw(rng) for _ in range(rows)]
+    simulation.reset_rows(np.arange(rows), drawn)
+    cranes = [scenario.crane for scenario, _ in drawn]
+    features = features_for(rows, PERIOD, simulation.sensors)
+    got, true = [features.start(simulation.observe(), cranes)], [simulation.state.copy()]
+    output = np.zeros(rows)
+    for _ in range(steps):
+        output = 0.8 * output + 0.1 * rng.normal(size=rows)
+        simulation.advance(features.command(output))
+        got.append(features.advance(simulation.observe()))
+        true.append(simulation.state.copy())
+    return np.array(got, dtype=np.float64), np.array(true)
+
+
+def depth(got):
+    return 2.0 * np.arctanh(got[:, :, SENSED_FEATURES.index("depth_error")] / 4.0)
+
+
+def test_exact_readings_give_the_depth_to_centimetres():
+    got, true = ran(Sensors.ideal())
+    assert np.sqrt(np.mean(true[:, :, 0] ** 2)) > 0.3
+    assert np.sqrt(np.mean((depth(got) - true[:, :, 0]) ** 2)) < 0.03
+
+
+def test_noisy_and_late_readings_give_the_present_better_than_any_one_of_them():
+    """The depth sensor's noise is 5 cm, the heave rate's 1 cm/s or 1 %; all are 0.1 s late."""
+    got, true = ran("sensors")
+    settled = slice(150, None)
+
+    def error(name, scale, truth):
+        difference = got[settled, :, SENSED_FEATURES.index(name)] / scale - truth[settled]
+        return np.median(np.sqrt(np.mean(difference**2, axis=0)))
+
+    off = np.median(np.sqrt(np.mean((depth(got) - true[:, :, 0])[settled] ** 2, axis=0)))
+    assert off < 0.02
+    assert error("load_velocity_z", 5.0, true[:, :, 1]) < 0.03
+    assert error("pulley_velocity_z", 1.0, true[:, :, 7]) < 0.015
+    late = np.median(np.sqrt(np.mean((true[1:, :, 7] - true[:-1, :, 7])[settled] ** 2, axis=0)))
+    assert late > 0.02  # what a reading that is 0.1 s late would be off by, without any noise
+
+
+@pytest.mark.parametrize("observation", ["state", "sensors"])
+def test_features_are_of_order_one_over_the_distribution(observation):
+    got, _ = ran(observation)
+    names = STATE_FEATURES if observation == "state" else SENSED_FEATURES
+    size = np.quantile(np.abs(got), 0.9, axis=(0, 1))
+    assert (size < 0.8 * LIMIT).all(), dict(zip(names, size, strict=True))
+    assert (size > 0.05).all(), dict(zip(names, size, strict=True))
+
+
+def test_a_row_that_starts_anew_forgets_its_own_past_alone():
+    simulation = Simulation(3, observation="sensors", scenario=ScenarioDistribution(hs=3.0))
+    rng = np.random.default_rng(1)
+    simulation.reset_rows(np.arange(3), [simulation.draw(rng) for _ in range(3)])
+    cranes = [Crane()] * 3
+    restarted, going_on = (features_for(3, PERIOD, Sensors()) for _ in range(2))
+    for features in (restarted, going_on):
+        features.start(simulation.observe(), cranes)
+    output = np.full(3, 0.3)
+    for _ in range(50):
+        commands = [features.command(output) for features in (restarted, going_on)]
+        simulation.advance(commands[0])
+        for features in (restarted, going_on):
+            features.advance(simulation.observe())
+    one = np.array([1])
+    first = restarted.start(simulation.observe()[one], cranes[:1], one)
+    fresh = features_for(1, PERIOD, Sensors())
+    np.testing.assert_array_equal(first, fresh.start(simulation.observe()[one], cranes[:1]))
+    for features, count in ((restarted, 3), (going_on, 3), (fresh, 1)):
+        features.command(output[:count])
+    simulation.advance(commands[0])
+    after, want = restarted.advance(simulation.observe()), going_on.advance(simulation.observe())
+    np.testing.assert_array_equal(after[[0, 2]], want[[0, 2]])
+    np.testing.assert_array_equal(after[1], fresh.advance(simulation.observe()[one])[0])
+    assert not np.array_equal(after[1], want[1])
+
+
+@pytest.mark.parametrize("observation", ["state", Sensors.ideal()], ids=["state", "exact sensors"])
+def test_without_output_the_drum_takes_up_the_pulleys_motion(observation):
+    """What is left is the drift of many small misses, and the load's bobbing on its rope."""
+    rng = np.random.default_rng(3)
+    simulation = Simulation(8, observation=observation, control_period=PERIOD, scenario=ScenarioDistribution(hs=2.0))
+    drawn = [simulation.draw(rng) for _ in range(8)]
+    simulation.reset_rows(np.arange(8), drawn)
+    features = features_for(8, PERIOD, simulation.sensors)
+    features.start(simulation.observe(), [scenario.crane for scenario, _ in drawn])
+    rope_end, pulley = [], []
+    radius = drawn[0][0].crane.winch.drum_radius
+    for _ in range(300):
+        simulation.advance(features.command(np.zeros(8)))
+        features.advance(simulation.observe())
+        pulley.append(simulation.state[:, 6])
+        rope_end.append(simulation.state[:, 6] - radius * simulation.state[:, 9])
+    assert np.std(pulley) > 0.3
+    assert np.std(rope_end) < 0.15 * np.std(pulley)
+
+
+def test_an_output_moves_the_ropes_end():
+    """At 1 by the authority: a quarter of a second's worth of the winch's greatest acceleration."""
+    scenario = Scenario(motion=HarmonicMotion())
+    simulation = Simulation(2, control_period=PERIOD)
+    simulation.reset_rows(np.arange(2), [(scenario, 0)] * 2)
+    features = features_for(2, PERIOD, None)
+    features.start(simulation.observe(), [scenario.crane] * 2)
+    angles = []
+    for _ in range(30):
+        simulation.advance(features.command(np.array([1.0, -0.5])))
+        features.advance(simulation.observe())
+        angles.append(simulation.state[:, 9].copy())
+    speed = scenario.crane.winch.drum_radius * (angles[-1] - angles[-11])
+    np.testing.assert_allclose(speed, AUTHORITY * scenario.crane.winch.max_rope_acceleration * np.array([-1.0, 0.5]))

@@ -1,0 +1,95 @@
+"""The filters against Gaussian conditioning on all readings at once: the same estimate without any recursion."""
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag
+
+from agents.control.rope import RopeModel
+from agents.kalman import ACCELERATION_NOISE, RopeFilter, WaveBank, WaveFilter
+
+PERIOD = 0.1
+
+
+def conditioned(a, start, stirs, rows, readings, noises):
+    """Mean of the last state, given readings[k] (m,) = rows[k] (m, n) @ state k + noise; state 0 has none."""
+    steps, n = len(stirs), len(a)
+    # All states are linear in the first one and the stirs.
+    sources = block_diag(start, *stirs)
+    to_state = [np.hstack([np.eye(n), np.zeros((n, n * steps))])]
+    for k in range(steps):
+        step = a @ to_state[-1]
+        step[:, n * (k + 1) : n * (k + 2)] += np.eye(n)
+        to_state.append(step)
+    seen = np.vstack([rows[k] @ to_state[k + 1] for k in range(steps)])
+    noise = np.diag(np.concatenate(noises) ** 2)
+    gain = to_state[-1] @ sources @ seen.T @ np.linalg.inv(seen @ sources @ seen.T + noise)
+    return gain @ np.concatenate(readings)
+
+
+def test_the_wave_filter_is_the_conditional_mean():
+    bank, hold, steps = WaveBank(bands=3, build_up=1.0, damping=0.05, offset_drift=1e-4), 5, 23
+    rng = np.random.default_rng(2)
+    rates, depths = rng.normal(0.0, 0.5, steps), rng.normal(0.0, 0.3, steps)
+    waves = WaveFilter(2, PERIOD, hold, bank)
+    frequency = np.linspace(bank.lowest, bank.highest, 3)
+    exponent = -bank.damping + 1j * frequency
+    a = block_diag(*[np.exp(z.real * PERIOD) * rotation(z.imag * PERIOD) for z in exponent], 1.0)
+    see_rate = np.array([1.0, 0.0] * 3 + [0.0])
+    # The integral of Re(s exp(λ t)) is Re(s exp(λ t) / λ).
+    see_depth = np.append(np.stack([(1 / exponent).real, -(1 / exponent).imag], axis=1).ravel(), 1.0)
+    stirs, rows, readings, noises = [], [], [], []
+    for k in range(1, steps + 1):
+        waves.advance(np.array([rates[k - 1], 0.0]))
+        waves.correct(np.array([depths[k - 1], 0.0]) - waves.heave())
+        grow = 2.0 * PERIOD / bank.build_up if k * PERIOD < bank.build_up else 1.0 - np.exp(-2 * bank.damping * PERIOD)
+        stirs.append(np.diag([2.0 * bank.variance / 3 * grow, 0.0] * 3 + [bank.offset_drift * PERIOD]))
+        there = k % hold == 0
+        rows.append(np.array([see_rate, see_depth] if there else [see_rate]))
+        readings.append(np.array([rates[k - 1], depths[k - 1]] if there else [rates[k - 1]]))
+        noises.append(np.array([bank.rate_noise, bank.depth_noise] if there else [bank.rate_noise]))
+    start = np.diag([0.0] * 6 + [1e-6])
+    want = conditioned(a, start, stirs, rows, readings, noises)
+    assert waves.heave()[0] == pytest.approx(see_depth @ want, rel=1e-6)
+    assert waves.rate(np.array([0.0]))[0, 0] == pytest.approx(see_rate @ want, rel=1e-6)
+    ahead = np.linspace(0.0, 1.5, 1501)
+    rate = waves.rate(ahead)[:, 0]
+    assert waves.path(ahead[-1:])[0, 0] == pytest.approx(np.trapezoid(rate, ahead), abs=1e-6)
+    assert waves.heave()[1] == 0.0  # the other row's readings were all zero
+
+
+def rotation(angle):
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def test_the_rope_filter_is_the_conditional_mean():
+    frequency, noise, rate_noise, steps = np.array([1.5, 3.0]), np.array([0.01, 0.004]), 0.02, 15
+    rng = np.random.default_rng(4)
+    stretch = rng.normal(0.0, 0.05, (steps, 2))
+    model = RopeModel.of(frequency, 0.03, PERIOD)
+    rope = RopeFilter(2, rate_noise)
+    rope.start(model, PERIOD, noise)
+    for reading in stretch:
+        rope.advance(np.zeros(2), reading)
+    see = np.array([[-1.0, 0.0, 1.0]])
+    for i in range(2):
+        a, b = model.a[i, :3, :3], model.b[i, :3]
+        stir = rate_noise**2 * np.outer(b, b) + np.diag([0.0, (ACCELERATION_NOISE * PERIOD) ** 2, 0.0])
+        arguments = ([stir] * steps, [see] * steps, stretch[:, i : i + 1], [noise[i : i + 1]] * steps)
+        want = conditioned(a, 1e-4 * np.eye(3), *arguments)
+        assert rope.load_velocity[i] == pytest.approx(want[1], rel=1e-6)
+        assert rope.stretch[i] == pytest.approx(want[2] - want[0], rel=1e-6)
+
+
+def test_the_rope_filter_follows_a_load_that_it_is_told_of_exactly():
+    """The end of the rope swings to and fro; the estimates are those of the rope's own model."""
+    model = RopeModel.of(np.array([2.0]), 0.03, PERIOD)
+    rope = RopeFilter(1, 0.01)
+    rope.start(model, PERIOD, np.array([1e-6]))
+    z = np.zeros((1, 4))
+    for k in range(200):
+        speed = np.array([0.5 * np.cos(0.7 * k * PERIOD)])
+        z[:, 3] = 0.0
+        z = model.advance(z, speed)
+        rope.advance(speed, z[:, 2] - z[:, 0])
+    assert rope.load_velocity[0] == pytest.approx(z[0, 1], abs=1e-6)
+    assert abs(z[0, 1]) > 0.05

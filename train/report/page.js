@@ -1,0 +1,399 @@
+"use strict";
+(async () => {
+  const element = (id) => document.getElementById(id);
+  const all = (selector, within = document) => [...within.querySelectorAll(selector)];
+
+  async function unpacked(id) {
+    const bytes = Uint8Array.from(atob(element(id).textContent), (character) => character.charCodeAt(0));
+    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+  }
+
+  const report = JSON.parse(await unpacked("data"));
+  const library = document.createElement("script");
+  library.textContent = await unpacked("plotly");
+  document.head.append(library);
+
+  // ---- words ----------------------------------------------------------------------------------------------------
+
+  const minus = (text) => text.replace("-", "−");
+  const percent = (share) => minus((100 * share).toFixed(share > 0.99 && share < 1 ? 2 : share > -1 ? 1 : 0)) + "\u00a0%";
+  const short = (share) => minus(String(Number((100 * share).toPrecision(6)))) + "\u00a0%";
+  const rounded = (value) => minus(Math.abs(value) < 1000 ? value.toPrecision(3) : String(Number(value.toPrecision(3))));
+  const signed = (value) => (value > 0 ? "+" : "") + minus(value.toFixed(2));
+
+  function traits(t) {
+    const degrees = Math.round((t.heading * 180) / Math.PI);
+    const sea = t.hs === null ? "" : `Hs ${t.hs.toFixed(2)} m, Tp ${t.tp.toFixed(1)} s, waves towards ${degrees}° from the bow, `;
+    return `${sea}${(t.load_mass / 1000).toFixed(0)} t on ${t.rope_length.toFixed(0)} m of rope ` +
+      `(bobs at ${t.rope_period.toFixed(1)} s)`;
+  }
+
+  function wrapped(name, width) {
+    const lines = [""];
+    for (const word of name.split(" ")) {
+      if (lines.at(-1) && lines.at(-1).length + word.length > width) lines.push("");
+      lines[lines.length - 1] += (lines.at(-1) ? " " : "") + word;
+    }
+    return lines.map(escaped).join("<br>");
+  }
+
+  const escaped = (text) => text.replace(/[&<>]/g, (c) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;" })[c]);
+
+  // ---- looks ----------------------------------------------------------------------------------------------------
+
+  const COLOURS = 10;
+  const DASHES = ["solid", "dot"];
+  const narrow = () => window.innerWidth < 640;
+  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  const tint = (policy) => colour(policy === 0 ? "still" : `c${(policy - 1) % COLOURS}`);
+  const dash = (policy) =>
+    report.policies[policy].privileged ? "dash" : DASHES[Math.floor(Math.max(0, policy - 1) / COLOURS) % DASHES.length];
+  const line = (policy, width = 2) => ({ color: tint(policy), width, dash: dash(policy) });
+
+  function axis(title, extra = {}) {
+    return {
+      title: { text: title, standoff: 8 }, gridcolor: colour("rule"), linecolor: colour("rule"), zeroline: false,
+      automargin: true, ...extra,
+    };
+  }
+
+  function draw(figure, traces, layout) {
+    const touch = window.matchMedia("(pointer: coarse)").matches;
+    // Plotly reads names as HTML.
+    const named = traces.map((trace) => ({ ...trace, ...(trace.name && { name: escaped(trace.name) }) }));
+    Plotly.react(figure, named, {
+      showlegend: false, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
+      font: { family: getComputedStyle(document.body).fontFamily, size: narrow() ? 11 : 12.5, color: colour("text") },
+      hoverlabel: { bgcolor: colour("raised"), bordercolor: colour("rule"), font: { color: colour("text") }, namelength: -1 },
+      margin: { l: 52, r: 14, t: 12, b: 44 },
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("quiet"), activecolor: colour("text") },
+      // A finger on a picture has to scroll the page.
+      dragmode: touch ? false : "zoom",
+      ...layout,
+    }, { responsive: true, displaylogo: false, displayModeBar: touch ? false : "hover",
+      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] });
+  }
+
+  // Heave reduction on an axis that is logarithmic in what is left of the heave, turned so that better is further.
+  const DECADES = Array.from({ length: 40 }, (_, index) => index - 20);
+  const BEYOND = 1e9;
+  const MOST_TICKS = 14;
+
+  // Figures 1, 2, 5 of every decade from low to high; where there is little room or they are many, 1 alone.
+  function ticksBetween(low, high, sparse) {
+    const within = (digits) => DECADES.flatMap((decade) => digits.map((digit) => Number(`${digit}e${decade}`)))
+      .filter((tick) => tick >= low && tick <= high);
+    const fine = within([1, 2, 5]);
+    return sparse || fine.length > MOST_TICKS ? within([1]) : fine;
+  }
+
+  function reductionAxis(title, values, sparse, extra = {}) {
+    const seen = values.filter((value) => value > 0);
+    const [low, high] = [Math.min(...seen, 0.5), Math.max(...seen, 1)];
+    const ticks = ticksBetween(low / 1.15, high * 1.15, sparse);
+    return axis(title, {
+      type: "log", range: [Math.log10(high * 1.15), Math.log10(low / 1.15)],
+      tickmode: "array", tickvals: ticks, ticktext: ticks.map((left) => short(1 - left)), ...extra,
+    });
+  }
+
+  // A logarithmic axis from low to high.
+  function logAxis(title, low, high, sparse, extra = {}) {
+    const shown = ticksBetween(low, high, sparse);
+    return axis(title, {
+      type: "log", range: [Math.log10(low), Math.log10(high)], tickmode: "array", tickvals: shown,
+      ticktext: shown.map((tick) => (tick >= 0.01 && tick < 1e4 ? String(tick) : `10<sup>${minus(String(Math.round(Math.log10(tick))))}</sup>`)),
+      ...extra,
+    });
+  }
+
+  // ---- policies to tick -----------------------------------------------------------------------------------------
+
+  // What is drawn of a section's policies: a set that its checkboxes change.
+  function chips(section, chosen, redraw) {
+    const holder = section.querySelector(".chips");
+    const boxes = report.policies.map((policy, index) => {
+      const label = document.createElement("label");
+      label.className = "chip";
+      const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: chosen.has(index) });
+      box.dataset.policy = index;
+      const sample = Object.assign(document.createElement("i"), { className: "line" });
+      sample.dataset.policy = index;
+      label.append(box, sample, policy.name, document.createElement("small"));
+      if (policy.privileged) label.title = "knows the whole future";
+      box.addEventListener("change", () => {
+        if (box.checked) chosen.add(index); else chosen.delete(index);
+        redraw();
+      });
+      holder.append(label);
+      return box;
+    });
+    for (const [word, wanted] of [["all", true], ["none", false]]) {
+      const button = Object.assign(document.createElement("button"), { type: "button", textContent: word });
+      button.addEventListener("click", () => {
+        for (const [index, box] of boxes.entries()) {
+          box.checked = wanted;
+          if (wanted) chosen.add(index); else chosen.delete(index);
+        }
+        redraw();
+      });
+      holder.append(button);
+    }
+    return boxes;
+  }
+
+  const inOrder = (chosen) => [...chosen].sort((a, b) => a - b);
+  const everyone = report.policies.map((_, index) => index);
+  const featured = report.featured;
+  const marked = (policy) => report.policies[policy].name + (report.policies[policy].privileged ? " (privileged)" : "");
+
+  function fill(select, options, value) {
+    select.replaceChildren(...options.map(([key, text]) => new Option(text, key)));
+    select.value = value;
+  }
+
+  // ---- sections -------------------------------------------------------------------------------------------------
+
+  let subset = 0;
+
+  function table() {
+    for (const body of all("#table tbody")) body.hidden = Number(body.dataset.subset) !== subset;
+    for (const select of all("select.subset")) select.value = subset;
+  }
+
+  function profiles(section, chosen) {
+    const curves = inOrder(chosen).map((policy) => [policy, report.subsets[subset].profiles[policy]]);
+    draw(section.querySelector(".plot"), curves.map(([policy, { x, y }]) => ({
+      // From nobody at its best, through the steps, to everybody out to the edge.
+      x: [x[0], ...x, BEYOND], y: [0, ...y, 1], name: marked(policy), mode: "lines", line: { ...line(policy, 2.2), shape: "hv" },
+      text: [x[0], ...x, x.at(-1)].map((left) => percent(1 - left)),
+      hovertemplate: "%{fullData.name}: at least %{text} in %{y:.1%}<extra></extra>",
+    })), {
+      xaxis: reductionAxis("heave reduction", curves.flatMap(([, { x }]) => x), narrow()),
+      yaxis: axis("share of scenarios", {
+        range: [0, 1.02], tickvals: [0, 0.2, 0.4, 0.6, 0.8, 1], ticktext: [0, 0.2, 0.4, 0.6, 0.8, 1].map(short),
+      }),
+    });
+  }
+
+  function pairs(section) {
+    const reference = Number(element("reference").value);
+    const found = everyone.map((policy) => [policy, report.pairs[reference][policy]]).filter(([, pair]) => pair);
+    // Privileged policies stand apart, below all others.
+    const rank = ([policy]) => (report.policies[policy].privileged ? 1 : 0);
+    found.sort((a, b) => rank(a) - rank(b) || a[1].ratio.median - b[1].ratio.median);
+    const ends = found.flatMap(([, pair]) => [...pair.spread, pair.ratio.low, pair.ratio.high]);
+    const places = found.map((_, place) => found.length - 1 - place);
+    const traces = found.flatMap(([policy, pair], index) => [
+      { x: pair.spread, y: [places[index], places[index]], mode: "lines", line: { color: tint(policy), width: 1.5 }, hoverinfo: "skip" },
+      { x: [pair.ratio.low, pair.ratio.high], y: [places[index], places[index]], mode: "lines", line: { color: tint(policy), width: 10 }, opacity: 0.5, hoverinfo: "skip" },
+      {
+        x: [pair.ratio.median], y: [places[index]], mode: "markers", name: marked(policy),
+        marker: { color: report.policies[policy].privileged ? colour("ground") : tint(policy), size: 8, line: { color: tint(policy), width: 2 } },
+        hovertemplate: `%{fullData.name}: %{x:.3g} times the RMS error<br>better in ${percent(pair.better)}<extra></extra>`,
+      },
+    ]);
+    section.querySelector(".plot").style.height = `${Math.max(10, 5 + found.length * (narrow() ? 2.9 : 2.1))}rem`;
+    draw(section.querySelector(".plot"), traces, {
+      xaxis: logAxis("RMS error over the reference's", Math.min(0.5, ...ends) / 1.3, Math.max(2, ...ends) * 1.3, narrow()),
+      yaxis: axis("", {
+        tickmode: "array", tickvals: places, range: [-0.6, found.length - 0.4], showgrid: false,
+        ticktext: found.map(([policy]) => wrapped(marked(policy), narrow() ? 16 : 40)),
+      }),
+      shapes: [{ type: "line", x0: 1, x1: 1, y0: 0, y1: 1, yref: "paper", line: { color: colour("quiet"), width: 1.5, dash: "dot" } }],
+    });
+    element("pair-table").tBodies[0].replaceChildren(...found.map(([policy, pair]) => {
+      const row = document.createElement("tr");
+      if (report.policies[policy].privileged) row.className = "privileged";
+      const name = document.createElement("th");
+      name.scope = "row";
+      name.append(report.policies[policy].name);
+      if (report.policies[policy].privileged) {
+        name.append(" ", Object.assign(document.createElement("span"), { className: "tag", textContent: "privileged" }));
+      }
+      const d = pair.difference, r = pair.ratio;
+      const cells = [
+        [pair.scenarios],
+        [signed(100 * d.median), `${signed(100 * d.low)} … ${signed(100 * d.high)}`],
+        [rounded(r.median), `${rounded(r.low)} … ${rounded(r.high)}`],
+        [percent(pair.better)],
+      ].map(([main, small]) => {
+        const cell = document.createElement("td");
+        cell.append(main);
+        if (small) cell.append(Object.assign(document.createElement("small"), { textContent: small }));
+        return cell;
+      });
+      row.append(name, ...cells);
+      return row;
+    }));
+  }
+
+  function dependence(section, chosen) {
+    const policies = inOrder(chosen);
+    const every = policies.flatMap((policy) => report.clouds[policy].left);
+    all(".plot", section).forEach((figure, place) => {
+      const { label, x, median } = report.dependences[place];
+      draw(figure, policies.flatMap((policy) => {
+        const { scenarios, left } = report.clouds[policy];
+        return [
+          {
+            x: scenarios.map((scenario) => x[scenario]), y: left, mode: "markers", name: marked(policy),
+            marker: { color: tint(policy), size: 4, opacity: 0.45, symbol: report.policies[policy].privileged ? "circle-open" : "circle" },
+            text: left.map((value, index) => `scenario ${scenarios[index]}: ${percent(1 - value)}`),
+            hovertemplate: "%{fullData.name}, %{text}<extra></extra>",
+          },
+          { ...median[policy], mode: "lines", name: marked(policy), line: line(policy, 2.6), hoverinfo: "skip" },
+        ];
+      }), {
+        xaxis: axis(escaped(label)),
+        yaxis: reductionAxis(place % 2 && !narrow() ? "" : "heave reduction", every, true),
+      });
+    });
+  }
+
+  function histories(section, chosen, boxes) {
+    const example = report.examples[Number(element("scenario").value)];
+    const ran = new Map(example.histories.map((history) => [history.policy, history]));
+    for (const [policy, box] of boxes.entries()) {
+      box.disabled = !ran.has(policy);
+      box.parentElement.querySelector("small").textContent = ran.has(policy) ? percent(ran.get(policy).reduction) : "did not run";
+    }
+    element("scenario-traits").textContent = `Scenario ${example.scenario}: ${traits(example.traits)}.`;
+    const shown = inOrder(chosen).filter((policy) => ran.has(policy)).map((policy) => ran.get(policy));
+    const rows = [
+      ["error", "depth error, m", "y", 1],
+      ["error", "the same, cm", "y2", 100],
+      ["rope_speed", "rope paid out, m/s", "y3", 1],
+      ["tension", "rope tension, kN", "y4", 1],
+    ];
+    const traces = rows.flatMap(([quantity, , yaxis, factor]) => shown.map((history) => ({
+      x: history[quantity].map((_, step) => Number((step * report.control_period).toFixed(6))),
+      y: history[quantity].map((value) => factor * value),
+      yaxis, name: marked(history.policy), mode: "lines", line: line(history.policy, 1.6),
+      hovertemplate: "%{fullData.name}: %{y:.3g}<extra></extra>",
+    })));
+    const small = magnified(example, shown);
+    const layout = {
+      xaxis: axis("time, s", { anchor: "y4", domain: [0, 1] }), hovermode: "closest", margin: { l: 56, r: 14, t: 8, b: 44 },
+    };
+    rows.forEach(([, title, name], index) => {
+      const top = 1 - index * 0.26;
+      layout[name.replace("y", "yaxis")] = axis(title, {
+        domain: [Math.max(0, top - 0.22), top], automargin: false, ...(name === "y2" ? { range: [-small, small] } : {}),
+      });
+    });
+    draw(section.querySelector(".plot"), traces, layout);
+  }
+
+  // The scale, cm, at which what the better half of the policies leaves can be seen.
+  function magnified(example, shown) {
+    const sorted = [...(shown.length ? shown : example.histories)].sort((a, b) => b.reduction - a.reduction);
+    const middle = sorted[Math.floor((sorted.length - 1) / 2)];
+    return 115 * Math.max(...middle.error.map(Math.abs), 1e-5);
+  }
+
+  function spectra(section, chosen) {
+    const curves = report.subsets[subset].spectra;
+    const [lowest, highest] = [curves[0].x[0], curves[0].x.at(-1)];
+    const top = Math.max(...(chosen.size ? inOrder(chosen) : everyone).flatMap((policy) => curves[policy].y));
+    draw(section.querySelector(".plot"), inOrder(chosen).map((policy) => ({
+      ...report.subsets[subset].spectra[policy], name: marked(policy), mode: "lines", line: line(policy),
+      text: report.subsets[subset].spectra[policy].x.map((frequency) => `${rounded(frequency)} Hz (${rounded(1 / frequency)} s)`),
+      hovertemplate: "%{fullData.name} at %{text}: %{y:.2e} m²/Hz<extra></extra>",
+    })), {
+      xaxis: logAxis("frequency, Hz", lowest, highest, narrow()),
+      yaxis: logAxis("spectral density, m²/Hz", top * 1e-11, top * 2, true),
+    });
+  }
+
+  function worst() {
+    const policy = Number(element("worst-policy").value);
+    const holder = element("episodes");
+    for (const figure of all(".plot", holder)) Plotly.purge(figure);
+    holder.replaceChildren(...report.worst[policy].map((episode, rank) => {
+      const article = Object.assign(document.createElement("article"), { className: "episode" });
+      const title = document.createElement("h3");
+      title.textContent = `${rank + 1}. Scenario ${episode.scenario}: heave reduction ${percent(episode.reduction)}`;
+      const facts = document.createElement("p");
+      facts.textContent = `${traits(episode.traits)}. RMS ${rounded(100 * episode.rms)} cm, ` +
+        `${rounded(100 * episode.still_rms)} cm with the drum still; largest error ${rounded(100 * episode.omega2)} cm.`;
+      const list = document.createElement("ul");
+      list.append(...episode.what.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+      const words = document.createElement("div"), body = document.createElement("div");
+      words.append(facts, list);
+      const figure = Object.assign(document.createElement("figure"), { className: "plot" });
+      figure.setAttribute("aria-label", `Depth error in scenario ${episode.scenario}`);
+      body.append(words, figure);
+      article.append(title, body);
+      return article;
+    }));
+    all(".plot", holder).forEach((figure, rank) => {
+      const { error, still_error } = report.worst[policy][rank];
+      const trace = (values, who, width) => ({
+        x: values.map((_, step) => Number((step * report.control_period).toFixed(6))), y: values,
+        name: marked(who), mode: "lines", line: line(who, width), hovertemplate: "%{fullData.name}: %{y:.3g} m<extra></extra>",
+      });
+      draw(figure, [trace(still_error, 0, 1.2), trace(error, policy, 1.8)], {
+        xaxis: axis("time, s"), yaxis: axis("depth error, m"), margin: { l: 50, r: 10, t: 6, b: 40 },
+      });
+    });
+  }
+
+  // ---- bring it to life -----------------------------------------------------------------------------------------
+
+  const sections = Object.fromEntries(all("main section").map((section) => [section.id, section]));
+  const drawn = {
+    profiles: new Set(everyone.slice(1)), dependence: new Set(featured.filter((policy) => policy > 0)),
+    histories: new Set([0, ...featured]), spectra: new Set([0, ...featured]),
+  };
+  const redraw = {
+    table, profiles: () => profiles(sections.profiles, drawn.profiles), pairs: () => pairs(sections.pairs),
+    dependence: () => dependence(sections.dependence, drawn.dependence),
+    histories: () => histories(sections.histories, drawn.histories, boxes.histories),
+    spectra: () => spectra(sections.spectra, drawn.spectra), worst,
+  };
+  const boxes = {};
+  for (const [name, chosen] of Object.entries(drawn)) {
+    boxes[name] = chips(sections[name], chosen, () => redraw[name]());
+  }
+
+  const names = everyone.map((policy) => [policy, marked(policy)]);
+  fill(element("reference"), names, report.reference);
+  fill(element("worst-policy"), names.filter(([policy]) => report.worst[policy].length), report.reference || 1);
+  fill(element("scenario"), report.examples.map(({ scenario, label, traits: t }, index) => [
+    index, `${label}: scenario ${scenario}` + (t.hs === null ? "" : `, Hs ${t.hs.toFixed(1)} m, Tp ${t.tp.toFixed(1)} s`),
+  ]), 0);
+  element("reference").addEventListener("change", redraw.pairs);
+  element("scenario").addEventListener("change", redraw.histories);
+  element("worst-policy").addEventListener("change", redraw.worst);
+  for (const select of all("select.subset")) {
+    select.addEventListener("change", () => {
+      subset = Number(select.value);
+      for (const name of ["table", "profiles", "spectra"]) redraw[name]();
+    });
+  }
+
+  function everything() {
+    for (const sample of all(".line[data-policy]")) {
+      const policy = Number(sample.dataset.policy);
+      sample.style.borderTop = `3px ${{ solid: "solid", dash: "dashed", dot: "dotted" }[dash(policy)]} ${tint(policy)}`;
+    }
+    for (const paint of Object.values(redraw)) paint();
+  }
+
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  function theme(name) {
+    document.documentElement.dataset.theme = name;
+    everything();
+  }
+  element("theme").addEventListener("click", () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"));
+  dark.addEventListener("change", () => theme(dark.matches ? "dark" : "light"));
+
+  theme(dark.matches ? "dark" : "light");
+  document.documentElement.dataset.ready = "yes";
+})().catch((error) => {
+  const notice = document.getElementById("failure");
+  notice.hidden = false;
+  notice.textContent = `The pictures could not be drawn: ${error.message}`;
+  console.error(error);
+});
