@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from aframe_env.motion import COORDINATES, FloatArray
 from aframe_env.validation import InvalidValue, require_number
@@ -76,9 +77,7 @@ class RecordedMotion:
         coordinates.setflags(write=False)
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "coordinates", coordinates)
-        from scipy.interpolate import make_interp_spline  # half of the time of importing the package
-
-        object.__setattr__(self, "_spline", make_interp_spline(times, coordinates, k=5))
+        object.__setattr__(self, "_spline", scipy.interpolate.make_interp_spline(times, coordinates, k=5))
 
     @classmethod
     def from_csv(cls, path: str | Path) -> RecordedMotion:
@@ -100,7 +99,7 @@ class RecordedMotion:
         t = np.atleast_1d(np.asarray(times, dtype=np.float64))
         for extreme in (t.min(), t.max()) if t.size else ():
             require_number("time", float(extreme), "s", low=0.0, high=self.duration)
-        spline: BSpline = self._spline  # type: ignore[attr-defined]
+        spline: scipy.interpolate.BSpline = self._spline  # type: ignore[attr-defined]
         return np.stack([spline(t), spline(t, nu=1), spline(t, nu=2)])
 
     def table(self, period: float) -> FloatArray:
