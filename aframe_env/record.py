@@ -22,7 +22,7 @@ from aframe_env.motion import COORDINATES, FloatArray
 from aframe_env.validation import InvalidValue, require_number
 
 if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
+    pass
 
 _LENGTHS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
 _ANGLES: Final = {"rad": 1.0, "deg": math.pi / 180.0}
