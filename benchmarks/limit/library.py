@@ -8,6 +8,7 @@ import os
 import platform
 import shutil
 import subprocess
+import tempfile
 from itertools import accumulate
 from pathlib import Path
 from typing import Any, Final
@@ -18,7 +19,9 @@ import numpy.typing as npt
 from train.output import write_atomically
 
 SOURCE: Final = Path(__file__).with_name("limit.cpp")
-FLAGS: Final = ("-O3", "-march=native", "-ffast-math", "-fopenmp", "-shared", "-fPIC")
+FLAGS: Final = ("-O3", "-march=native", "-ffast-math", "-fopenmp", "-fPIC")
+LINK_FLAGS: Final = ("-shared", "-fopenmp")
+"""Without -ffast-math: that would link code which changes the floating-point mode of whoever loads the library."""
 BUILD: Final = Path(__file__).parents[2] / "build" / "benchmarks"
 
 _SIZES: Final = {
@@ -65,11 +68,18 @@ def compiler_version() -> str:
 def compile_library() -> Path:
     """Compile the limit unless this source, with this compiler on this machine, has been compiled before."""
     key = hashlib.sha256(SOURCE.read_bytes())
-    key.update(" ".join((compiler_version(), platform.node(), *FLAGS)).encode())
+    key.update(" ".join((compiler_version(), platform.node(), *FLAGS, *LINK_FLAGS)).encode())
     path = BUILD / f"limit-{key.hexdigest()[:16]}.so"
     if not path.exists():
-        write_atomically(path, lambda temporary: _run([compiler(), *FLAGS, "-o", str(temporary), str(SOURCE)]))
+        write_atomically(path, _compile)
     return path
+
+
+def _compile(path: Path) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        compiled = str(Path(folder) / "limit.o")
+        _run([compiler(), *FLAGS, "-c", "-o", compiled, str(SOURCE)])
+        _run([compiler(), *LINK_FLAGS, "-o", str(path), compiled])
 
 
 def _run(command: list[str]) -> str:
