@@ -13,7 +13,7 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.compiling import kernel, scalar, source_digest
+from aframe_env.dynamics.compiling import kernel, scalar
 from aframe_env.dynamics.flexible import readout
 from aframe_env.sensors import CHANNELS, Sensors
 
@@ -136,11 +136,9 @@ def charge_parted(row: Any, episode_duration: float, lanes: int, j: int) -> None
 @cache
 def report_kernel(lanes: int) -> Callable[..., None]:
     """Kernel (blocks, episode duration, state (N, 14), results (N, RESULTS)) that reads the rows out."""
-    source: Any = source_digest()
 
     @kernel
     def report(blocks, episode_duration, state, results):  # type: ignore[no-untyped-def]
-        source  # noqa: B018
         for i in range(state.shape[0]):
             row = blocks[i // lanes]
             j = i % lanes

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.compiling import kernel, source_digest
+from aframe_env.dynamics.compiling import kernel
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -34,7 +34,6 @@ class KnotKernels(NamedTuple):
 @cache
 def knot_kernels() -> KnotKernels:
     """Compile, or take from the cache."""
-    source: Any = source_digest()
 
     @kernel
     def segments(
@@ -46,7 +45,6 @@ def knot_kernels() -> KnotKernels:
     ) -> int:
         # As many as the two bounds allow: a power of two. A motion that builds up has a knot where its ramp ends,
         # since the quintics must not span the kink.
-        source  # noqa: B018
         x, y, z = pulley
         sixth = 0.0
         for k in range(frequency.shape[0]):
@@ -68,7 +66,6 @@ def knot_kernels() -> KnotKernels:
 
     @kernel
     def write(row: FloatArray, frequency: FloatArray, response: ComplexArray, interval: float) -> None:
-        source  # noqa: B018
         for k in range((row.shape[0] - at.ROW_SLOTS) // at.COMPONENT_SLOTS):
             base = at.ROW_SLOTS + k * at.COMPONENT_SLOTS
             row[base + at.PHASE_RE] = 1.0
