@@ -15,8 +15,8 @@ from train.output import versions
 RESULTS = Path(__file__).parents[2] / "results"
 SCENARIOS = 4
 HERE = 1e-9
-"""Relative, with the same processor and libraries: the Kalman filters' gains come out of the linear algebra library, the
-sums of which depend on its number of threads in the last bit. Agents without filters meet the figures exactly."""
+"""Relative, with the same processor and libraries: the Kalman filters' gains come out of the linear algebra library,
+the sums of which depend on its number of threads in the last bit. Agents without filters meet the figures exactly."""
 ELSEWHERE = 0.02
 """Relative: another processor or library rounds otherwise, and a closed loop forgets that but for its noise."""
 
