@@ -80,6 +80,7 @@ class Worker:
                 start_new_session=True,  # an interrupt is for the run, which then ends its workers
             )
         except OSError as error:
+            self._errors.close()
             raise NotMeasured(f"{Path(pythons.command(script)[0]).name}: {error.strerror}") from error
         finally:
             if allowed:

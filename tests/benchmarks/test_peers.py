@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from aframe_env.dynamics import layout as at
-from benchmarks.catalogue import Script
+from benchmarks.catalogue import ENVPOOL_SCRIPT, Script
 from benchmarks.limit.library import NoCompiler, compile_library
 from benchmarks.limit.measure import TOLERANCE, trajectories
 from benchmarks.package.dynamics import SyntheticMotion, engine
@@ -20,13 +20,13 @@ GYMNASIUM = Script("benchmarks/peers/gymnasium_envs.py")
 def test_scipy_gives_the_package_s_load():
     ours = engine(1, SyntheticMotion())
     start = ours.read_many(at.LOAD_POSITION, 3)[0]
-    still = np.zeros(1)
+    farthest, still = 0.0, np.zeros(1)
     for _ in range(solve_ivp.CONTROL_STEPS):
         ours.step(still)
-    theirs = solve_ivp.episode()
-    load = ours.read_many(at.LOAD_POSITION, 3)[0]
-    assert np.abs(load - start).max() > 0.1
-    np.testing.assert_allclose(theirs[:3], load, atol=5e-3)
+        load = ours.read_many(at.LOAD_POSITION, 3)[0]
+        farthest = max(farthest, abs(load[2] - start[2]))
+    assert farthest > 0.5
+    np.testing.assert_allclose(solve_ivp.episode()[:3], load, atol=5e-3)
 
 
 def test_cpp_gives_the_package_s_load():
@@ -52,6 +52,18 @@ def test_a_script_that_fails_says_so_and_goes_on():
             worker.sample("nonsense")
         assert worker.sample("pendulum") > 0.0
         assert "gymnasium" in worker.versions
+    finally:
+        worker.close()
+
+
+def test_a_peer_that_could_not_be_installed_is_reported_with_the_reason(tmp_path):
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "python").symlink_to(Path(sys.executable).resolve())  # without any packages
+    (tmp_path / "failures.json").write_text('{"envpool==1": "ERROR: no matching distribution"}')
+    worker = Worker(ENVPOOL_SCRIPT, 1, Pythons(tmp_path / "bin" / "python"))
+    try:
+        with pytest.raises(NotMeasured, match="envpool==1 could not be installed: ERROR: no matching"):
+            worker.sample("sync-64-1")
     finally:
         worker.close()
 
