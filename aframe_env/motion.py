@@ -97,9 +97,7 @@ def require_coverage(motion: ShipMotion, name: str, duration: float) -> None:
     """Raise unless the motion is known for ``duration`` s, which the user calls ``name``."""
     known = getattr(motion, "duration", math.inf)
     if known < duration * (1.0 - 1e-9):
-        raise InvalidValue(
-            f"{name} = {duration:g} s: must be in (0, {known:g}] s, the length of the recorded motion {motion}"
-        )
+        raise InvalidValue(f"{name} = {duration:g} s: must be in (0, {known:g}] s, the length of the recorded motion")
 
 
 @dataclass(frozen=True, kw_only=True)
