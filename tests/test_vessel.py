@@ -23,7 +23,7 @@ def mss_response() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     The source has x forward, y to starboard, z down: sway, heave, pitch and yaw change sign. Its elevation is
     positive upwards, its heading 180° a head sea, as here.
     """
-    data = np.loadtxt(MSS, delimiter=",", skiprows=5)
+    data = np.loadtxt(MSS, delimiter=",", skiprows=6)
     frequencies, headings = np.unique(data[:, 0]), np.unique(data[:, 1])
     data = data[np.lexsort((data[:, 1], data[:, 0]))].reshape(len(frequencies), len(headings), 14)
     response = data[:, :, 2::2] * np.exp(1j * data[:, :, 3::2])
