@@ -154,7 +154,7 @@ class _SeaMotion:
 
 def _sea_motion(table: _SeaMotion, folder: Path) -> SeaMotion:
     vessel = Vessel.supply() if table.vessel == _SUPPLY else Vessel.from_csv(folder / table.vessel)
-    if table.deck_position is not None:
+    if table.deck_position not in (None, vessel.deck_position):
         vessel = replace(vessel, deck_position=table.deck_position)
     return SeaMotion(sea=table.sea, vessel=vessel)
 

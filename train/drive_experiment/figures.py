@@ -57,7 +57,7 @@ def _drives(path: Path, experiment: Experiment, drives: Sequence[Result], radius
         if result.drive is None:
             continue
         # Drives that nearly coincide stay visible: each narrower than the one below it.
-        colour, label, width = COLOURS[result.row.label], result.row.label, 1.2 + 1.8 * (len(drives) - 1 - index)
+        colour, label, width = COLOURS[result.row.label], result.row.label, 1.2 + 1.4 * (len(drives) - 1 - index)
         phi = result.drive.angle(times)
         angle.plot(times, phi, color=colour, lw=width)
         speed.plot(times, result.drive.speed(times), color=colour, lw=width)

@@ -163,8 +163,10 @@ def _histories(
         axis.plot(time, theirs * panel.scale, color=REFERENCE, linewidth=2.2, alpha=0.6, label=names[1])
         axis.plot(time, ours * panel.scale, color=HERE, linewidth=0.9, label=names[0])
         gap = np.max(np.abs(ours - theirs)) / np.ptp(theirs)
+        title = f"{panel.what}: largest difference {gap:.2%} of peak-to-peak"
         about_mean = np.max(np.abs(ours - theirs - np.mean(ours - theirs))) / np.ptp(theirs)
-        title = f"{panel.what}: largest difference {gap:.2%} of peak-to-peak, {about_mean:.2%} less its mean"
+        if about_mean < 0.5 * gap:
+            title += f"; {about_mean:.2%} apart from a constant"
         axis.set_title(title, fontsize=9)
         axis.set_ylabel(f"{panel.symbol}, {panel.unit}")
     grid[0].legend(fontsize=8, loc="upper right")
