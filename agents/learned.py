@@ -28,6 +28,7 @@ from agents.policy import FloatArray, Knowledge
 FORMAT = 2
 WEIGHTS = "agent.safetensors"
 CARD = "agent.json"
+_BLOCK = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,9 +89,16 @@ class LearnedPolicy:
             inputs = self._features.start(observation, self._cranes)
         else:
             inputs = self._features.advance(observation)
+        return self._features.command(self._output(inputs))
+
+    def _output(self, inputs: npt.NDArray[np.float32]) -> FloatArray:
+        # In blocks of one size: how a matrix product is summed depends on its shape, and a row must not on the others.
+        rows = len(inputs)
+        padded = np.zeros((-(-rows // _BLOCK) * _BLOCK, inputs.shape[1]), dtype=np.float32)
+        padded[:rows] = inputs
         with torch.no_grad():
-            share = self.actor(torch.from_numpy(inputs))
-        return self._features.command(share[:, 0].double().numpy())
+            blocks = [self.actor(block) for block in torch.split(torch.from_numpy(padded), _BLOCK)]
+        return np.asarray(torch.cat(blocks)[:rows, 0].double().numpy())
 
     def predict(
         self, observation: npt.NDArray[np.float32], *, first: bool = False, crane: Crane | None = None

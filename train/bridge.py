@@ -40,9 +40,13 @@ class TrainingVecEnv(VecEnv):
         horizon: float,
         drift_limit: float,
         reward_scale: float,
+        reward_knee: float = math.inf,
         seed: int,
     ) -> None:
-        """``horizon`` [s]: rows start anew after that time; ``drift_limit`` [m]: and where the load is so far off."""
+        """``horizon`` [s]: rows start anew after that time; ``drift_limit`` [m]: and where the load is so far off.
+
+        ``reward_knee`` [m]: beyond it the reward falls with the error's logarithm only.
+        """
         self._simulation = Simulation(
             rows,
             scenario=scenario,
@@ -53,6 +57,7 @@ class TrainingVecEnv(VecEnv):
         self._horizon = max(1, round(min(horizon, episode_duration) / control_period))
         self._drift_limit = drift_limit
         self._reward_scale = reward_scale
+        self._reward_knee = reward_knee
         self._rng = np.random.default_rng(seed)
         self._commands = np.zeros(rows)
         self._no_infos: list[dict[str, Any]] = [{} for _ in range(rows)]
@@ -106,6 +111,8 @@ class TrainingVecEnv(VecEnv):
         self._error_sum += float(cost.sum())
         self._still_sum += float(np.square(simulation.state[:, 6]).sum()) * simulation.control_period
         rms = np.sqrt(np.minimum(cost / simulation.control_period, 1e4))
+        if math.isfinite(self._reward_knee):
+            rms = self._reward_knee * np.log1p(rms / self._reward_knee)
         rewards = -self._reward_scale * rms
         self._return += rewards
         self._length += 1

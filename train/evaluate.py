@@ -1,4 +1,4 @@
-"""Compare policies on the same held-out scenarios: ``python -m train.evaluate --policies results/ppo S-Ω1``.
+"""Compare policies on the same held-out scenarios: ``python -m train.evaluate --policies results/agents/ppo S-Ω1``.
 
 A policy is a name ("S-Ω1", or s-omega1 on a keyboard without Ω), the folder of an agent, or module:function for your
 own: see ``agents.catalogue``. The drum left alone is always there as the yardstick. Writes the table (Markdown, JSON,
@@ -31,13 +31,15 @@ class Options(HeldOut):
     """Which policies, on what."""
 
     policies: tuple[str, ...] = (
-        "results/ppo",
+        "results/agents/ppo",
+        "results/agents/sac",
+        "results/agents/ppo-sensors",
         "results/drive-map",
         *AFTER_TRAINING,
         "predictive control",
         "inverse dynamics",
     )
-    """Names, folders of agents, or module:function."""
+    """Names, folders of agents (of all seeds, where there are several), or module:function."""
     report: bool = True
     """Write report.html and episodes.parquet too (extra "report")."""
     out: Path | None = None

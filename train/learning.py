@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import shlex
 import sys
 import time
@@ -66,6 +67,8 @@ class LearningOptions:
     """Depth error at which a row starts anew, m; its last state's value stands for the rest."""
     reward_scale: float = 1.0
     """Reward for a metre of root mean square depth error over a step."""
+    reward_knee: float = math.inf
+    """Depth error beyond which the reward falls with its logarithm only, m."""
     eval_scenarios: int = 200
     """Held-out scenarios of the comparison at the end; 0 leaves it out."""
     eval_privileged: int = 20
@@ -119,6 +122,7 @@ def make_rows(options: LearningOptions) -> TrainingVecEnv:
         horizon=options.horizon,
         drift_limit=options.drift_limit,
         reward_scale=options.reward_scale,
+        reward_knee=options.reward_knee,
         seed=options.seed,
     )
 

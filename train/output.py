@@ -13,6 +13,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from llvmlite.binding import get_host_cpu_name
+
 from aframe_env.validation import InvalidValue
 
 REPORTED_PACKAGES = ("gymnasium", "stable-baselines3", "torch", "numpy", "scipy", "numba", "waveresponse")
@@ -63,10 +65,11 @@ def new_file(path: Path, *, overwrite: bool = False) -> Path:
 
 
 def versions() -> dict[str, str]:
-    """Versions of what a result depends on."""
+    """Versions of what a result depends on, to the last digit."""
     return {
         "aframe-heave": version("aframe-heave"),
         "python": platform.python_version(),
+        "processor": get_host_cpu_name(),
         **{name: version(name) for name in REPORTED_PACKAGES},
     }
 

@@ -19,7 +19,8 @@ from rich.progress import Progress
 
 from aframe_env.scenario import Scenario, ScenarioDistribution
 from aframe_env.validation import InvalidValue, require_choice, require_integer
-from agents import drive_map, learned
+from agents import drive_map
+from agents.catalogue import Setting, choose
 from agents.drive_map_policy import DriveMapPolicy
 from agents.drive_policy import DrivePolicy
 from agents.optimisation import OPTIMISERS, OptimisedDrive, Optimiser
@@ -32,7 +33,7 @@ from train.sensitivity_study.analysis import Sensitivity, analyse
 from train.sensitivity_study.factors import FACTORS
 from train.sensitivity_study.figures import draw_curves, draw_indices
 from train.tasks import run_tasks
-from train.tuned_drives import tune
+from train.tuned_drives import DURATION, tune
 
 STILL, MAP = "drum still", "drive map"
 
@@ -41,7 +42,15 @@ STILL, MAP = "drum still", "drive map"
 class Options:
     """Which policies, in how many scenarios."""
 
-    policies: tuple[str, ...] = (STILL, *TUNED, MAP, "results/ppo")
+    policies: tuple[str, ...] = (
+        STILL,
+        *TUNED,
+        MAP,
+        "feed-forward + feedback",
+        "results/agents/ppo",
+        "results/agents/sac",
+        "results/agents/ppo-sensors",
+    )
     """"drum still", "S-Ω1", "S-Ω2", "H-Ω1", "H-Ω2", "drive map", or the folder of an agent."""
     scenarios: int = 8
     """Held-out random seas that are assumed."""
@@ -73,9 +82,8 @@ class Options:
         require_choice("optimiser", self.optimiser, OPTIMISERS)
         require_integer("seed", self.seed, low=0, high=2**32 - 1)
         for name in self.policies:
-            if name not in (STILL, MAP, *TUNED) and not (Path(name) / learned.CARD).exists():
-                names = ", ".join(repr(each) for each in (STILL, *TUNED, MAP))
-                raise InvalidValue(f"policies: {name!r}: must be one of {names}, or the folder of an agent")
+            if name not in (STILL, MAP, *TUNED) and choose(name).for_each_scenario:
+                raise InvalidValue(f"policies: {name!r}: is optimised for each scenario as S-Ω1 and its like are here")
 
 
 @dataclass(frozen=True)
@@ -97,9 +105,11 @@ def _policy(task: Task) -> Policy:
         return DriveMapPolicy(drive_map.load(task.options.drive_map), None)
     if task.name in TUNED:
         return DrivePolicy(task.name, task.drives, Knowledge.FUTURE)
-    agent = learned.load(task.name)
-    agent.name = f"{agent.name}, {agent.knows.value}"
-    return agent
+    scenarios = assumed_scenarios(task.options)
+    setting = Setting(
+        scenarios=scenarios, nominal=ScenarioDistribution().nominal(), episode_duration=DURATION, observation="state"
+    )
+    return choose(task.name).build(setting)
 
 
 def study(task: Task) -> Sensitivity:
