@@ -76,8 +76,7 @@ class TrainingVecEnv(VecEnv):
         self._left = np.zeros(rows, dtype=np.int64)
         self._return = np.zeros(rows)
         self._length = np.zeros(rows, dtype=np.int64)
-        self._error_sum = 0.0
-        self._still_sum = 0.0
+        self._error_sum, self._still_sum = np.zeros((2, rows))
 
     @property
     def quantities(self) -> tuple[task.Quantity, ...]:
@@ -85,13 +84,14 @@ class TrainingVecEnv(VecEnv):
         return self._simulation.quantities
 
     def take_reduction(self) -> float:
-        """Heave reduction over all steps since the last call, exploration included.
+        """Median over the rows of the heave reduction since the last call, exploration included.
 
         The pulley's heave stands for what the load of a still drum would do.
         """
-        reduction = 1.0 - math.sqrt(self._error_sum / self._still_sum) if self._still_sum else 0.0
-        self._error_sum = self._still_sum = 0.0
-        return reduction
+        moved = self._still_sum > 0.0
+        left = np.sqrt(self._error_sum[moved] / self._still_sum[moved])
+        self._error_sum[:] = self._still_sum[:] = 0.0
+        return 1.0 - float(np.median(left)) if len(left) else 0.0
 
     def reset(self) -> Float32Array:
         """Start all rows at random times of their horizon, so that they do not all end at once."""
@@ -108,8 +108,8 @@ class TrainingVecEnv(VecEnv):
         simulation = self._simulation
         simulation.advance(self._commands)
         cost = simulation.results[:, task.COST]
-        self._error_sum += float(cost.sum())
-        self._still_sum += float(np.square(simulation.state[:, 6]).sum()) * simulation.control_period
+        self._error_sum += cost
+        self._still_sum += np.square(simulation.state[:, 6]) * simulation.control_period
         rms = np.sqrt(np.minimum(cost / simulation.control_period, 1e4))
         if math.isfinite(self._reward_knee):
             rms = self._reward_knee * np.log1p(rms / self._reward_knee)
