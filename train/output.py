@@ -76,9 +76,12 @@ def versions() -> dict[str, str]:
 
 @contextlib.contextmanager
 def user_errors() -> Iterator[None]:
-    """Turn bad input and a failing disk into one line on standard error and exit status 2."""
+    """Turn bad input and a failing disk into one line on standard error and exit status 2, Ctrl-C into status 130."""
     try:
         yield
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        raise SystemExit(130) from None
     except (InvalidValue, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         raise SystemExit(2) from None
