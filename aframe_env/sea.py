@@ -26,6 +26,9 @@ from aframe_env.vessel import Vessel
 Spectrum = Literal["jonswap", "pierson-moskowitz"]
 SPECTRA: tuple[str, ...] = ("jonswap", "pierson-moskowitz")
 
+FULL_TURN = 2.0 * math.pi
+"""rad."""
+
 _GAMMA_STEP = 0.1
 _GAMMAS = np.linspace(1.0, 10.0, 91)
 _QUANTILES = 2049
@@ -48,7 +51,8 @@ class Sea:
     tp: float
     """Peak period, s."""
     heading: float = math.pi
-    """Direction that the waves travel towards, rad from the ship's bow towards port: 0 following, π head sea."""
+    """Direction that the waves travel towards, rad from the ship's bow towards port, in ±2π: 0 following sea, π head
+    sea."""
     spectrum: str = "jonswap"
     gamma: float = 3.3
     """Peak enhancement factor of the JONSWAP spectrum; 1 makes it Pierson-Moskowitz."""
@@ -62,7 +66,7 @@ class Sea:
     def __post_init__(self) -> None:
         require_number("hs", self.hs, "m", low=0.0, high=30.0)
         require_number("tp", self.tp, "s", low=2.0, high=40.0)
-        require_number("heading", self.heading, "rad")
+        require_number("heading", self.heading, "rad", low=-FULL_TURN, high=FULL_TURN)
         require_choice("spectrum", self.spectrum, SPECTRA)
         require_number("gamma", self.gamma, "", low=1.0, high=10.0)
         if self.spreading is not None:

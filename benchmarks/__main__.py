@@ -155,8 +155,7 @@ def run(options: Options, console: Console) -> int:
     partial.unlink(missing_ok=True)
     table = Table("bar", "", "measured", "ratio", "met", box=SIMPLE, padding=0)
     for row in rows:
-        met = {True: "yes", False: "no", None: "-"}[row.met]
-        table.add_row(row.what, row.bar, row.measured, row.ratio, met)
+        table.add_row(row.what, row.bar, row.measured, row.ratio, row.word)
     console.print(table)
     console.print(f"written: {folder / 'benchmarks.md'}")
     return 0

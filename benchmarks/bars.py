@@ -24,7 +24,15 @@ class Verdict:
     peer: str
     ratio: str
     met: bool | None
-    """None where it could not be measured; ``measured`` or ``peer`` then says why."""
+    """By the median. None where it could not be measured; ``measured`` or ``peer`` then says why."""
+    split: bool = False
+    """Whether some rounds say the opposite."""
+
+    @property
+    def word(self) -> str:
+        """The verdict in words."""
+        word = {True: "yes", False: "no", None: "not measured"}[self.met]
+        return f"{word}, not in every round" if self.split else word
 
 
 class Bar(Protocol):
@@ -87,7 +95,9 @@ class Ratio:
         if not mine.measured:
             return Verdict(self.what, bar, measured, peer, "", None)
         times = ratios(mine, run.get(best))
-        return Verdict(self.what, bar, measured, peer, spread(times), statistics.median(times) >= self.least)
+        holds = [ratio >= self.least for ratio in times]
+        met = statistics.median(times) >= self.least
+        return Verdict(self.what, bar, measured, peer, spread(times), met, len(set(holds)) > 1)
 
 
 @dataclass(frozen=True)
@@ -102,13 +112,13 @@ class Limit:
     def verdict(self, run: Run) -> Verdict:
         """Compare the median."""
         series, unit = run.get(self.key), MEASURES[self.key].unit
-        bar = (
-            f"{'≥' if self.at_least else '≤'} {number(self.limit) if self.limit >= 1e-3 else f'{self.limit:g}'} {unit}"
-        )
+        bar = f"{'≥' if self.at_least else '≤'} {number(self.limit) if self.limit >= 1e6 else f'{self.limit:g}'} {unit}"
         if not series.measured:
             return Verdict(self.what, bar, series.error, "", "", None)
-        met = series.median >= self.limit if self.at_least else series.median <= self.limit
-        return Verdict(self.what, bar, shown(series, unit), "", "", met)
+        met, *holds = (
+            value >= self.limit if self.at_least else value <= self.limit for value in (series.median, *series.samples)
+        )
+        return Verdict(self.what, bar, shown(series, unit), "", "", met, len(set(holds)) > 1)
 
 
 @dataclass(frozen=True)

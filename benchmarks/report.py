@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Final
 
-from benchmarks.bars import ENVPOOL_64_KEYS, ENVPOOL_KEYS, Verdict, best_of, number, ratios, shown, verdicts
+from benchmarks.bars import ENVPOOL_64_KEYS, ENVPOOL_KEYS, Verdict, best_of, number, ratios, shown, spread, verdicts
 from benchmarks.catalogue import MEASURES
 from benchmarks.pictures import draw
 from benchmarks.results import Run
@@ -22,7 +21,8 @@ an env step) unless said, float64, a load in three dimensions, 32 wave component
 (pendulum, cart-pole), two RK4 steps (MuJoCo), or what its row says. "C++" is
 [limit.cpp](../benchmarks/limit/limit.cpp) (-O3 -march=native -ffast-math, OpenMP): the same equations and integrator,
 without sea, lag, limit switches and a rope that parts. "Dynamics alone" is `Engine.step`, which with a sea includes
-its synthesis.
+its synthesis. Start-up: SciPy's interpolation is loaded by the first drawn sea, so its time is in the first reset and
+not in the import.
 """
 HEADLINES: Final[tuple[tuple[str, str, tuple[str, ...], str], ...]] = (
     (
@@ -44,18 +44,17 @@ HEADLINES: Final[tuple[tuple[str, str, tuple[str, ...], str], ...]] = (
 
 
 def headlines(run: Run) -> Iterator[tuple[str, str, str]]:
-    """What, its median, and its ratio to the peer."""
+    """What, its median, and the spread of its ratio to the peer."""
     for what, key, peers, name in HEADLINES:
         if run.get(key).measured:
             best = best_of(run, peers)
-            ratio = f"{number(statistics.median(ratios(run.get(key), run.get(best))))} × {name}" if best else ""
+            ratio = f"{spread(ratios(run.get(key), run.get(best)))} × {name}" if best else ""
             yield what, f"{number(run.get(key).median)} {MEASURES[key].unit}", ratio
 
 
 def markdown(run: Run, rows: Sequence[Verdict]) -> str:
     """The report as Markdown."""
-    met = {True: "yes", False: "**no**", None: "not measured"}
-    table = [(v.what, v.bar, v.measured, v.peer, v.ratio, met[v.met]) for v in rows]
+    table = [(v.what, v.bar, v.measured, v.peer, v.ratio, f"**{v.word}**" if v.met is False else v.word) for v in rows]
     figures = [
         (key, MEASURES[key].what, shown(series, MEASURES[key].unit), str(len(series.samples)))
         for key, series in run.series.items()

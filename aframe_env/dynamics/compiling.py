@@ -19,6 +19,8 @@ from numba.extending import intrinsic
 
 _LOGGER = logging.getLogger("aframe_env")
 
+_kernels: set[Callable[..., Any]] = set()
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 # No fastmath: a row must give the same bits in a batch, alone, and in any block. Division follows IEEE 754,
@@ -54,6 +56,7 @@ def _cached(function: F, **options: Any) -> F:
     own_source = Path(function.__code__.co_filename).read_bytes()
     variant = hashlib.sha256(f"{source_digest()} {cells!r} ".encode() + own_source).hexdigest()[:16]
     function.__qualname__ += f"-{variant}"
+    _kernels.add(function)
     try:
         return cast(F, njit(cache=True, **options, **_OPTIONS)(function))
     except RuntimeError:  # no cache folder can be written to
@@ -67,9 +70,9 @@ class _Announcer(event.Listener):
         self._silent = False
 
     def on_start(self, event: Any) -> None:
-        """Of the compilation of a function that the cache has not."""
+        """Of the compilation of a kernel that the cache has not."""
         dispatcher = event.data["dispatcher"]
-        if self._silent or dispatcher.py_func.__module__.partition(".")[0] not in ("aframe_env", "agents"):
+        if self._silent or dispatcher.py_func not in _kernels:
             return
         self._silent = True
         folder = dispatcher.stats.cache_path

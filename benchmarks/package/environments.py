@@ -13,13 +13,12 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 
 import aframe_env
+from benchmarks.catalogue import COST_ROWS
 from benchmarks.package.dynamics import INNER_STEP, SyntheticMotion, steps
 from benchmarks.peers.serve import Measurement, serve, speed
 
 EPISODE = 601
 """Steps of an episode of 60 s, the one that resets included."""
-COSTS = tuple(4**k for k in range(10))
-"""Rows, from 1 to 262,144."""
 MEMORY_ROWS = 65_536
 
 
@@ -122,7 +121,7 @@ def main() -> None:
         "memory-peak": partial(memory, 0),
         "memory-kept": partial(memory, 1),
     }
-    for rows in COSTS:
+    for rows in COST_ROWS:
         measurements[f"env-{rows}"] = partial(within_episode, rows)
         measurements[f"engine-{rows}"] = partial(steps, rows, SyntheticMotion())
     serve(measurements)

@@ -17,6 +17,6 @@ def components() -> tuple[np.ndarray, np.ndarray]:
     frequency = 0.35 + 0.04 * k
     size = np.exp(-(((frequency - 0.7) / 0.25) ** 2))
     coordinate = np.arange(6)
-    phase = 2.4 * k[:, None] + 1.1 * coordinate  # 2.4 rad is about the golden angle
+    phase = 2.4 * k[:, None] ** 2 + 1.1 * coordinate  # linear in k the components would be one pulse, soon gone
     scale = np.array([0.2, 0.2, 0.4, 0.012, 0.006, 0.003])
     return frequency, scale * size[:, None] * np.exp(1j * phase)

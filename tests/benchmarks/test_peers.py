@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from aframe_env.dynamics import layout as at
-from benchmarks.catalogue import Script
+from benchmarks.catalogue import ENVPOOL_SCRIPT, Script
 from benchmarks.limit.library import NoCompiler, compile_library
 from benchmarks.limit.measure import TOLERANCE, trajectories
 from benchmarks.package.dynamics import SyntheticMotion, engine
@@ -20,14 +20,13 @@ GYMNASIUM = Script("benchmarks/peers/gymnasium_envs.py")
 def test_scipy_gives_the_package_s_load():
     ours = engine(1, SyntheticMotion())
     start = ours.read_many(at.LOAD_POSITION, 3)[0]
-    still, moved = np.zeros(1), 0.0
+    farthest, still = 0.0, np.zeros(1)
     for _ in range(solve_ivp.CONTROL_STEPS):
         ours.step(still)
-        moved = max(moved, np.abs(ours.read_many(at.LOAD_POSITION, 3)[0] - start).max())
-    theirs = solve_ivp.episode()
-    load = ours.read_many(at.LOAD_POSITION, 3)[0]
-    assert moved > 0.04
-    np.testing.assert_allclose(theirs[:3], load, atol=1e-5)
+        load = ours.read_many(at.LOAD_POSITION, 3)[0]
+        farthest = max(farthest, abs(load[2] - start[2]))
+    assert farthest > 0.5
+    np.testing.assert_allclose(solve_ivp.episode()[:3], load, atol=5e-3)
 
 
 def test_cpp_gives_the_package_s_load():
@@ -38,7 +37,6 @@ def test_cpp_gives_the_package_s_load():
     theirs, ours = trajectories()
     assert np.ptp(ours[:, :, 2]) > 1.0
     assert np.abs(theirs - ours).max() < TOLERANCE
-    assert np.nextafter(0.0, 1.0) * 1.0 > 0.0, "loading the library has changed the floating-point mode"
 
 
 def test_a_missing_interpreter_is_named():
@@ -54,6 +52,18 @@ def test_a_script_that_fails_says_so_and_goes_on():
             worker.sample("nonsense")
         assert worker.sample("pendulum") > 0.0
         assert "gymnasium" in worker.versions
+    finally:
+        worker.close()
+
+
+def test_a_peer_that_could_not_be_installed_is_reported_with_the_reason(tmp_path):
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "python").symlink_to(Path(sys.executable).resolve())  # without any packages
+    (tmp_path / "failures.json").write_text('{"envpool==1": "ERROR: no matching distribution"}')
+    worker = Worker(ENVPOOL_SCRIPT, 1, Pythons(tmp_path / "bin" / "python"))
+    try:
+        with pytest.raises(NotMeasured, match="envpool==1 could not be installed: ERROR: no matching"):
+            worker.sample("sync-64-1")
     finally:
         worker.close()
 

@@ -30,10 +30,10 @@ class Division:
     """n of the top beam, even (the pulley S sits on its middle rfe), in [2, 10000]."""
 
     def __post_init__(self) -> None:
-        require_integer("division.leg", self.leg, low=1, high=10_000)
-        require_integer("division.beam", self.beam, low=2, high=10_000)
+        require_integer("rfes (leg)", self.leg, low=1, high=10_000)
+        require_integer("rfes (beam)", self.beam, low=2, high=10_000)
         if self.beam % 2:
-            raise InvalidValue(f"division.beam = {self.beam}: must be even, for S to lie on the middle rfe")
+            raise InvalidValue(f"rfes (beam) = {self.beam}: must be even, for S to lie on the middle rfe")
 
 
 @dataclass(frozen=True, kw_only=True)
