@@ -114,6 +114,11 @@ class Engine:
         """Rows in a block."""
         return self._lanes
 
+    @property
+    def records(self) -> FloatArray:
+        """Recorded motions that rows follow: lines of deck coordinates, rates and accelerations, (lines, 18)."""
+        return self._records
+
     def step(self, commands: FloatArray) -> None:
         """Advance every row by one control step with the drum speed commands (rows,) rad/s."""
         if self._lanes == 1:

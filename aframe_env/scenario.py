@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -21,7 +21,8 @@ INITIALS: tuple[str, ...] = ("comoving", "rest")
 Range = float | tuple[float, float]
 """One exact value, or the interval that a value is drawn from uniformly."""
 
-_UNIFORMS = 8  # numbers that each sub-stream takes from the generator, however many it needs
+SUBSTREAM: Final = 8
+"""Numbers that sea, load and rope each take from the generator, however many they need."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,16 +167,19 @@ class ScenarioDistribution:
         require_integer("components", self.components, low=1, high=4096)
         # The corners of the distribution must be scenarios: refuse now rather than in the middle of a run.
         for u in (0.0, 1.0):
-            self._build(np.full(_UNIFORMS, u), np.full(_UNIFORMS, u), np.full(_UNIFORMS, u))
+            self._build(np.full(SUBSTREAM, u), np.full(SUBSTREAM, u), np.full(SUBSTREAM, u))
 
     def draw(self, rng: np.random.Generator) -> Scenario:
         """Draw one scenario."""
-        u = rng.random(3 * _UNIFORMS)
-        return self._build(u[:_UNIFORMS], u[_UNIFORMS : 2 * _UNIFORMS], u[2 * _UNIFORMS :])
+        return self.at(rng.random(3 * SUBSTREAM))
+
+    def at(self, uniforms: np.ndarray) -> Scenario:
+        """Return the scenario that these numbers in [0, 1) stand for: sea, load and rope, SUBSTREAM each."""
+        return self._build(uniforms[:SUBSTREAM], uniforms[SUBSTREAM : 2 * SUBSTREAM], uniforms[2 * SUBSTREAM :])
 
     def nominal(self) -> Scenario:
         """Return the scenario in the middle of every interval, with the first realisation of its sea."""
-        half = np.full(_UNIFORMS, 0.5)
+        half = np.full(SUBSTREAM, 0.5)
         sea = half.copy()
         sea[4] = 0.0
         return self._build(sea, half, half)

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from numba import njit, types
+from numba import config, njit, types
 from numba.extending import intrinsic
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -44,7 +44,12 @@ def _fused(typing_context, a, b, c):  # type: ignore[no-untyped-def]
     return types.float64(a, b, c), generate
 
 
-_fused_multiply_add: Any = intrinsic(_fused)
+def _rounded_twice(a: float, b: float, c: float) -> float:
+    return a * b + c
+
+
+# Uncompiled, as numba's CUDA simulator needs it, Python has nothing better before 3.13.
+_fused_multiply_add: Any = _rounded_twice if config.DISABLE_JIT else intrinsic(_fused)
 
 
 @scalar

@@ -1,0 +1,75 @@
+"""What agents see and do, as in ``features``, for tensors on any device: nothing goes to the processor and back."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import torch
+
+from aframe_env.crane import GRAVITY, Crane, Winch
+from aframe_env.task import STATE
+from agents.control.winch import WinchModel
+from agents.features import AUTHORITY, LIMIT, STATE_FEATURES
+
+
+class _Inverse(Protocol):
+    def __call__(self, winch: Winch, turn: torch.Tensor, speed: torch.Tensor, period: float) -> torch.Tensor: ...
+
+
+class TensorStateFeatures:
+    """``StateFeatures`` of rows that all have one crane; a test holds the two together."""
+
+    names = STATE_FEATURES
+
+    def __init__(self, crane: Crane, control_period: float, *, cuda: bool) -> None:
+        """``cuda``: whether the tensors are on a CUDA device, or in numba's simulator of one."""
+        self._crane = crane
+        self._period = control_period
+        self._invert: _Inverse = _on_the_processor
+        if cuda:
+            from agents.control.winch_cuda import find_commands
+
+            self._invert = find_commands
+
+    def look(self, observation: torch.Tensor) -> torch.Tensor:
+        """Features (N, F) float32 of observations (N, K) float32."""
+        o = _columns(observation)
+        radius, axial_stiffness = self._crane.winch.drum_radius, self._crane.rope.axial_stiffness
+        mass, length = o["load_mass"], o["rope_length"]
+        first_length = length - radius * o["drum_angle"]
+        features = (
+            4.0 * torch.tanh(0.5 * o["depth_error"]),
+            2.0 * torch.tanh(10.0 * o["depth_error"]),
+            5.0 * o["load_velocity_z"],
+            20.0 * (o["rope_tension"] - mass * GRAVITY) * length / axial_stiffness,
+            10.0 * (o["pulley_velocity_z"] - radius * o["drum_speed"]),
+            o["pulley_velocity_z"],
+            o["pulley_acceleration_z"],
+            0.5 * o["pulley_heave"],
+            mass / 5.0e4 - 1.2,
+            length / 1.0e3 - 0.8,
+            0.25 * torch.sqrt(axial_stiffness / (first_length * mass)) - 1.0,
+        )
+        return torch.clamp(torch.stack(features, dim=1), -LIMIT, LIMIT).to(torch.float32)
+
+    def command(self, observation: torch.Tensor, output: torch.Tensor) -> torch.Tensor:
+        """Drum speed commands (N, 1) rad/s for a network's output (N, 1), in [-1, 1], to observations (N, K)."""
+        o = _columns(observation)
+        winch, period = self._crane.winch, self._period
+        rise = period * (o["pulley_velocity_z"] + 0.5 * period * o["pulley_acceleration_z"])
+        up = AUTHORITY * winch.max_acceleration * winch.drum_radius * torch.clamp(output[:, 0].double(), -1.0, 1.0)
+        turn = (rise - period * up) / winch.drum_radius
+        return self._invert(winch, turn, o["drum_speed"], period)[:, None].to(torch.float32)
+
+
+def _columns(observation: torch.Tensor) -> dict[str, torch.Tensor]:
+    """Quantities (N,) float64 by their names."""
+    columns = observation.T.double().contiguous()
+    return {quantity.name: columns[i] for i, quantity in enumerate(STATE)}
+
+
+def _on_the_processor(winch: Winch, turn: torch.Tensor, speed: torch.Tensor, period: float) -> torch.Tensor:
+    model = WinchModel(len(turn), period)
+    model.start([Crane(winch=winch)] * len(turn))
+    model.speed[:] = speed.numpy()
+    return torch.from_numpy(model.find(turn.numpy()))
