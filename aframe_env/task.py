@@ -149,9 +149,7 @@ def read_out(row: Any, lanes: int, j: int, state: Any, results: Any, i: int) -> 
     state[i, 10] = row[at.DRUM_SPEED * lanes + j]
     state[i, 11] = row[at.TENSION * lanes + j]
     state[i, 12] = row[at.MASS * lanes + j]
-    state[i, 13] = (
-        row[at.FREE_LENGTH * lanes + j] + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
-    )
+    state[i, 13] = row[at.FREE_LENGTH * lanes + j] + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
     results[i, TIME] = row[at.TIME * lanes + j]
     for k in range(3):
         results[i, LOAD + k] = row[(at.LOAD_POSITION + k) * lanes + j]

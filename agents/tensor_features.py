@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable
+from functools import partial
 
 import torch
 
-from aframe_env.crane import GRAVITY, Crane, Winch
+from aframe_env.crane import GRAVITY, Crane
 from aframe_env.task import STATE
 from agents.control.winch import WinchModel
 from agents.features import AUTHORITY, LIMIT, STATE_FEATURES
 
 
-class _Inverse(Protocol):
-    def __call__(self, winch: Winch, turn: torch.Tensor, speed: torch.Tensor, period: float) -> torch.Tensor: ...
+_Find = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
+"""(wanted turns, drum speeds), both (N,) float64 → commands (N,)."""
 
 
 class TensorStateFeatures:
@@ -25,11 +26,13 @@ class TensorStateFeatures:
         """``cuda``: whether the tensors are on a CUDA device, or in numba's simulator of one."""
         self._crane = crane
         self._period = control_period
-        self._invert: _Inverse = _on_the_processor
+        self._find: _Find
         if cuda:
             from agents.control.winch_cuda import find_commands
 
-            self._invert = find_commands
+            self._find = partial(find_commands, crane.winch, control_period)
+        else:
+            self._find = _OnTheProcessor(crane, control_period)
 
     def look(self, observation: torch.Tensor) -> torch.Tensor:
         """Features (N, F) float32 of observations (N, K) float32."""
@@ -59,7 +62,7 @@ class TensorStateFeatures:
         rise = period * (o["pulley_velocity_z"] + 0.5 * period * o["pulley_acceleration_z"])
         up = AUTHORITY * winch.max_acceleration * winch.drum_radius * torch.clamp(output[:, 0].double(), -1.0, 1.0)
         turn = (rise - period * up) / winch.drum_radius
-        return self._invert(winch, turn, o["drum_speed"], period)[:, None].to(torch.float32)
+        return self._find(turn, o["drum_speed"])[:, None].to(torch.float32)
 
 
 def _columns(observation: torch.Tensor) -> dict[str, torch.Tensor]:
@@ -68,8 +71,16 @@ def _columns(observation: torch.Tensor) -> dict[str, torch.Tensor]:
     return {quantity.name: columns[i] for i, quantity in enumerate(STATE)}
 
 
-def _on_the_processor(winch: Winch, turn: torch.Tensor, speed: torch.Tensor, period: float) -> torch.Tensor:
-    model = WinchModel(len(turn), period)
-    model.start([Crane(winch=winch)] * len(turn))
-    model.speed[:] = speed.numpy()
-    return torch.from_numpy(model.find(turn.numpy()))
+class _OnTheProcessor:
+    """``WinchModel`` behind tensors."""
+
+    def __init__(self, crane: Crane, control_period: float) -> None:
+        self._crane, self._period = crane, control_period
+        self._winches = WinchModel(0, control_period)
+
+    def __call__(self, turn: torch.Tensor, speed: torch.Tensor) -> torch.Tensor:
+        if len(self._winches.speed) != len(turn):
+            self._winches = WinchModel(len(turn), self._period)
+            self._winches.start([self._crane] * len(turn))
+        self._winches.speed[:] = speed.numpy()
+        return torch.from_numpy(self._winches.find(turn.numpy()))

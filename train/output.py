@@ -13,6 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from gymnasium.error import DependencyNotInstalled
 from llvmlite.binding import get_host_cpu_name
 
 from aframe_env.validation import InvalidValue
@@ -67,9 +68,9 @@ def versions() -> dict[str, str]:
 
 @contextlib.contextmanager
 def user_errors() -> Iterator[None]:
-    """Turn bad input and a failing disk into one line on standard error and exit status 2."""
+    """Turn bad input, a failing disk and a missing extra into one line on standard error and exit status 2."""
     try:
         yield
-    except (InvalidValue, OSError) as error:
+    except (InvalidValue, OSError, DependencyNotInstalled) as error:
         print(f"error: {error}", file=sys.stderr)
         raise SystemExit(2) from None

@@ -101,9 +101,7 @@ def knot_kernels() -> KnotKernels:
         bound = 0.0
         for k in range(frequency.shape[0]):
             r = response[k]
-            bound += bend_bound(
-                frequency[k], abs(r[0]), abs(r[1]), abs(r[2]), abs(r[3]), abs(r[4]), abs(r[5]), *pulley
-            )
+            bound += bend_bound(frequency[k], abs(r[0]), abs(r[1]), abs(r[2]), abs(r[3]), abs(r[4]), abs(r[5]), *pulley)
         return segments_between_knots(bound, segment, ramp)
 
     @kernel

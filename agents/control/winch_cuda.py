@@ -15,9 +15,7 @@ from agents.control.winch import command_for
 _THREADS = 128
 
 
-def invert(
-    turn: Any, speed: Any, limit: float, acceleration: float, lag: float, period: float, command: Any
-) -> None:
+def invert(turn: Any, speed: Any, limit: float, acceleration: float, lag: float, period: float, command: Any) -> None:
     """Kernel: ``command`` (N,) of equal winches for wanted turns (N,) in a control step."""
     i = cuda.grid(1)
     if i < turn.shape[0]:
@@ -29,7 +27,7 @@ def _kernel() -> Any:
     return cuda.jit(invert)
 
 
-def find_commands(winch: Winch, turn: torch.Tensor, speed: torch.Tensor, period: float) -> torch.Tensor:
+def find_commands(winch: Winch, period: float, turn: torch.Tensor, speed: torch.Tensor) -> torch.Tensor:
     """Commands (N,) rad/s that turn equal winches by ``turn`` (N,) rad in ``period`` s, or as near as may be.
 
     ``speed`` (N,) rad/s: the drums' speed now. All float64, on one device.
