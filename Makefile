@@ -3,7 +3,7 @@ PYTHON ?= python3
 ARGS ?=
 BIN := .venv/bin
 
-.PHONY: train drives test verify bench check clean
+.PHONY: train drives test verify results bench check clean
 
 train: .venv/installed
 	$(BIN)/python -m train.ppo $(ARGS)
@@ -14,6 +14,22 @@ drives: .venv/installed
 verify: .venv/installed
 	$(BIN)/python -m train.verify $(ARGS)
 
+# Agents, comparisons and studies as they are shipped: some hours.
+results: .venv/installed-test
+	$(BIN)/python -m train.ppo --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/ppo
+	$(BIN)/python -m train.ppo --observation sensors --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/ppo-sensors
+	$(BIN)/python -m train.sac --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/sac
+	$(BIN)/python -m train.tune_control --scenarios 200 --evaluations 24 --overwrite --out results/control
+	$(BIN)/python -m train.drives --case paper --check rfem --overwrite --out results/drives-paper
+	$(BIN)/python -m train.drive_map --overwrite --out results/drive-map
+	$(BIN)/python -m train.optimisers --overwrite --out results/optimisers
+	$(BIN)/python -m train.evaluate --scenarios 1000 --overwrite --out results/comparison
+	$(BIN)/python -m train.evaluate --model rfem --privileged 0 --overwrite --out results/comparison-full-model --policies \
+		results/agents/ppo results/agents/sac results/agents/ppo-sensors \
+		"feed-forward + feedback (state)" "feed-forward + feedback"
+	$(BIN)/python -m train.sensitivity --overwrite --out results/sensitivity
+	$(BIN)/python -m train.verify
+
 test: .venv/installed-test
 	$(BIN)/python -m pytest $(ARGS)
 
@@ -23,7 +39,7 @@ check: .venv/installed-test
 	$(BIN)/mypy
 
 bench: .venv/installed-test .venv-peers/installed
-	$(BIN)/python -m benchmarks.engine $(ARGS)
+	$(BIN)/python -m benchmarks $(ARGS)
 	$(BIN)/python -m benchmarks.rfem
 	$(BIN)/python -m benchmarks.rfem_peer --peer-python .venv-peers/bin/python
 
@@ -42,7 +58,7 @@ bench: .venv/installed-test .venv-peers/installed
 
 .venv-peers/installed: benchmarks/peers.txt | .venv/bin/python
 	$(PYTHON) -m venv .venv-peers
-	.venv-peers/bin/python -m pip install --disable-pip-version-check -q -r benchmarks/peers.txt
+	.venv-peers/bin/python benchmarks/peers/install.py benchmarks/peers.txt
 	touch $@
 
 clean:

@@ -14,7 +14,7 @@ from aframe_env import task
 from aframe_env.rendering import open_renderer
 from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.simulation import RowState, Simulation
-from aframe_env.validation import InvalidValue, require_choice
+from aframe_env.validation import InvalidValue, require_choice, require_numbers
 
 if TYPE_CHECKING:
     from aframe_env.rendering.renderer import Renderer
@@ -202,7 +202,7 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
         simulation = self._simulation
         if simulation.scenarios[0] is None:
             raise gymnasium.error.ResetNeeded("step() before the first reset()")
-        command = np.asarray(action, dtype=np.float64)
+        command = require_numbers("action", action, "rad/s")
         if command.shape != (1,):
             raise InvalidValue(f"action of shape {command.shape}: must be of shape (1,), rad/s")
         if not np.isfinite(command[0]):

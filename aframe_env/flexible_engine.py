@@ -56,7 +56,7 @@ def mesh_of(model: str, rfes: tuple[int, int] | None, modes: int | None) -> Mesh
     if rfes is None:
         return Mesh(Division(), modes)
     if not isinstance(rfes, tuple) or len(rfes) != 2:
-        raise InvalidValue(f"rfes = {rfes!r}: must be a pair of integers, the elements of a leg and of the beam")
+        raise InvalidValue(f"rfes = {rfes!r}: must be a tuple of two integers, the elements of a leg and of the beam")
     require_integer("rfes (leg)", rfes[0], low=1, high=MOST_RFES)
     require_integer("rfes (beam)", rfes[1], low=2, high=MOST_RFES)
     if rfes[1] % 2:

@@ -97,9 +97,9 @@ def require_coverage(motion: ShipMotion, name: str, duration: float) -> None:
     """Raise unless the motion is known for ``duration`` s, which the user calls ``name``."""
     known = getattr(motion, "duration", math.inf)
     if known < duration * (1.0 - 1e-9):
-        raise InvalidValue(
-            f"{name} = {duration:g} s: must be in (0, {known:g}] s, the length of the recorded motion {motion}"
-        )
+        path = getattr(motion, "path", None)
+        record = "the recorded motion" if path is None else str(path)
+        raise InvalidValue(f"{name} = {duration:g} s: must be in (0, {known:g}] s, the length of {record}")
 
 
 @dataclass(frozen=True, kw_only=True)

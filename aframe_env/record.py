@@ -12,14 +12,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import BSpline, make_interp_spline
+import scipy
 
 from aframe_env.motion import COORDINATES, FloatArray
 from aframe_env.validation import InvalidValue, require_number
+
+if TYPE_CHECKING:
+    pass
 
 _LENGTHS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
 _ANGLES: Final = {"rad": 1.0, "deg": math.pi / 180.0}
@@ -74,7 +77,7 @@ class RecordedMotion:
         coordinates.setflags(write=False)
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "coordinates", coordinates)
-        object.__setattr__(self, "_spline", make_interp_spline(times, coordinates, k=5))
+        object.__setattr__(self, "_spline", scipy.interpolate.make_interp_spline(times, coordinates, k=5))
 
     @classmethod
     def from_csv(cls, path: str | Path) -> RecordedMotion:
@@ -96,7 +99,7 @@ class RecordedMotion:
         t = np.atleast_1d(np.asarray(times, dtype=np.float64))
         for extreme in (t.min(), t.max()) if t.size else ():
             require_number("time", float(extreme), "s", low=0.0, high=self.duration)
-        spline: BSpline = self._spline  # type: ignore[attr-defined]
+        spline: scipy.interpolate.BSpline = self._spline  # type: ignore[attr-defined]
         return np.stack([spline(t), spline(t, nu=1), spline(t, nu=2)])
 
     def table(self, period: float) -> FloatArray:

@@ -11,7 +11,7 @@ import numpy as np
 
 from aframe_env.crane import GRAVITY, Crane
 from aframe_env.motion import HarmonicMotion, ShipMotion, has_components, is_tabled
-from aframe_env.sea import Sea, SeaMotion, dnv_gamma
+from aframe_env.sea import FULL_TURN, Sea, SeaMotion, dnv_gamma
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
 from aframe_env.vessel import Vessel
 
@@ -61,6 +61,12 @@ class Scenario:
             raise InvalidValue(
                 f"target_level = {self.target_level!r} m: must be below the pulley, in (-inf, {pulley:g}) m"
             )
+        breaking_load = self.crane.rope.breaking_load
+        if self.weight >= breaking_load:
+            raise InvalidValue(
+                f"load_mass = {self.load_mass!r} kg: must be in (0, {breaking_load / self.gravity:g}) kg, for the rope "
+                f"parts at {breaking_load:g} N"
+            )
         if not least < self.free_length < most:
             raise InvalidValue(
                 f"target_level = {self.target_level!r} m needs {self.free_length:g} m of unstretched rope between "
@@ -106,14 +112,16 @@ def free_length(crane: Crane, rope_length: float, weight: float) -> float:
     return (rope_length + crane.drum_to_pulley) / (1.0 + weight / crane.rope.axial_stiffness)
 
 
-def _require_range(name: str, value: Range, unit: str, low: float, high: float, low_open: bool = False) -> None:
+def _require_range(name: str, value: Any, unit: str, low: float, high: float, low_open: bool = False) -> None:
     if isinstance(value, tuple):
         if len(value) != 2:
-            raise InvalidValue(f"{name} = {value!r}: must be a number or a pair (low, high) in {unit}")
+            raise InvalidValue(f"{name} = {value!r}: must be a number or a tuple (low, high) in {unit}")
         for part, item in zip(("low", "high"), value, strict=True):
             require_number(f"{name} ({part})", item, unit, low=low, high=high, low_open=low_open)
         if value[0] > value[1]:
             raise InvalidValue(f"{name} = {value!r} {unit}: the low end is above the high end")
+    elif isinstance(value, list):
+        raise InvalidValue(f"{name} = {value!r}: must be a number or a tuple (low, high) in {unit}")
     else:
         require_number(name, value, unit, low=low, high=high, low_open=low_open)
 
@@ -155,19 +163,32 @@ class ScenarioDistribution:
     def __post_init__(self) -> None:
         _require_range("hs", self.hs, "m", 0.0, 30.0)
         _require_range("tp", self.tp, "s", 2.0, 40.0)
-        _require_range("heading", self.heading, "rad", -1e3, 1e3)
+        _require_range("heading", self.heading, "rad", -FULL_TURN, FULL_TURN)
         if self.gamma != "dnv":
             if isinstance(self.gamma, str):
-                raise InvalidValue(f"gamma = {self.gamma!r}: must be 'dnv', a number or a pair in [1, 10]")
+                raise InvalidValue(f"gamma = {self.gamma!r}: must be 'dnv', a number or a tuple (low, high) in [1, 10]")
             _require_range("gamma", self.gamma, "", 1.0, 10.0)
         require_number("ramp", self.ramp, "s", low=0.0, high=1e4)
         _require_range("load_mass", self.load_mass, "kg", 0.0, 1e7, low_open=True)
         _require_range("rope_length", self.rope_length, "m", 0.0, 1e5, low_open=True)
         _require_range("rope_damping_ratio", self.rope_damping_ratio, "of critical", 0.0, 1.0)
         require_integer("components", self.components, low=1, high=4096)
+        self._require_rope()
         # The corners of the distribution must be scenarios: refuse now rather than in the middle of a run.
         for u in (0.0, 1.0):
             self._build(np.full(SUBSTREAM, u), np.full(SUBSTREAM, u), np.full(SUBSTREAM, u))
+
+    def _require_rope(self) -> None:
+        """Raise where a rope is longer or shorter than the winch allows, in the user's words."""
+        least, most = self.crane.winch.min_rope_length, self.crane.winch.max_rope_length
+        for length in self.rope_length if isinstance(self.rope_length, tuple) else (self.rope_length,):
+            for mass in self.load_mass if isinstance(self.load_mass, tuple) else (self.load_mass,):
+                paid_out = free_length(self.crane, length, mass * GRAVITY)
+                if not least < paid_out < most:
+                    raise InvalidValue(
+                        f"rope_length = {self.rope_length!r} m: {length:g} m needs {paid_out:g} m of unstretched rope "
+                        f"between drum and load: must be in ({least:g}, {most:g}) m, the winch's limits"
+                    )
 
     def draw(self, rng: np.random.Generator) -> Scenario:
         """Draw one scenario."""

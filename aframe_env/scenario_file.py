@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -101,14 +101,16 @@ def _converter(folder: Path) -> Converter:
 
     def member(value: Any, _: Any) -> MemberSection:
         if isinstance(value, list):
-            return tuple(section(item, None) for item in value)
+            return converter.structure(value, tuple[Section, ...])
         return section(value, None)
 
     def motion(value: Any, _: Any) -> ShipMotion:
         kind, rest = _kind(value, _MOTIONS)
         if kind == "harmonic":
             return converter.structure(rest, HarmonicMotion)
-        return _recorded(rest, folder) if kind == "recorded" else _sea_motion(rest, folder, converter)
+        if kind == "recorded":
+            return RecordedMotion.from_csv(folder / converter.structure(rest, _Recorded).file)
+        return _sea_motion(converter.structure(rest, _SeaMotion), folder)
 
     converter.register_structure_hook(StressPoint, stress_point)
     converter.register_structure_hook_func(lambda kind: kind == MemberSection, member)
@@ -128,35 +130,33 @@ def _kind(value: Any, kinds: tuple[str, ...]) -> tuple[str, dict[str, Any]]:
     """The kind that a table names, and the rest of the table."""
     if not isinstance(value, dict):
         raise InvalidValue(f"{value!r}: must be a table with a kind, one of {', '.join(kinds)}")
-    require_choice("kind", value.get("kind"), kinds)
+    if "kind" not in value:
+        raise InvalidValue(f"key 'kind' is missing: must be one of {', '.join(map(repr, kinds))}")
+    require_choice("kind", value["kind"], kinds)
     return value["kind"], {key: item for key, item in value.items() if key != "kind"}
 
 
-def _keys(table: Mapping[str, Any], known: tuple[str, ...]) -> None:
-    for key in table:
-        if key not in known:
-            raise InvalidValue(f"unknown key {key!r}: must be one of kind, {', '.join(known)}")
+@dataclass(frozen=True)
+class _Recorded:
+    """``[motion]`` of the kind "recorded"."""
+
+    file: str
 
 
-def _recorded(table: Mapping[str, Any], folder: Path) -> RecordedMotion:
-    _keys(table, ("file",))
-    if not isinstance(table.get("file"), str):
-        raise InvalidValue(f"file = {table.get('file')!r}: must be the name of a CSV file")
-    return RecordedMotion.from_csv(folder / table["file"])
+@dataclass(frozen=True)
+class _SeaMotion:
+    """``[motion]`` of the kind "sea"."""
+
+    sea: Sea
+    vessel: str = _SUPPLY
+    deck_position: tuple[float, float, float] | None = None
 
 
-def _sea_motion(table: Mapping[str, Any], folder: Path, converter: Converter) -> SeaMotion:
-    _keys(table, ("sea", "vessel", "deck_position"))
-    if "sea" not in table:
-        raise InvalidValue("key 'sea' is missing: a table with at least hs and tp")
-    name = table.get("vessel", _SUPPLY)
-    if not isinstance(name, str):
-        raise InvalidValue(f"vessel = {name!r}: must be {_SUPPLY!r} or the name of a CSV file")
-    vessel = Vessel.supply() if name == _SUPPLY else Vessel.from_csv(folder / name)
-    deck = converter.structure(table.get("deck_position", vessel.deck_position), tuple[float, float, float])
-    if deck != vessel.deck_position:
-        vessel = replace(vessel, deck_position=deck)
-    return SeaMotion(sea=converter.structure(table["sea"], Sea), vessel=vessel)
+def _sea_motion(table: _SeaMotion, folder: Path) -> SeaMotion:
+    vessel = Vessel.supply() if table.vessel == _SUPPLY else Vessel.from_csv(folder / table.vessel)
+    if table.deck_position not in (None, vessel.deck_position):
+        vessel = replace(vessel, deck_position=table.deck_position)
+    return SeaMotion(sea=table.sea, vessel=vessel)
 
 
 def _sea_table(motion: SeaMotion, converter: Converter) -> dict[str, Any]:

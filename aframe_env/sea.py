@@ -12,12 +12,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
-from typing import Any, Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.dynamics.compiling import kernel, source_digest
+from aframe_env.dynamics.compiling import kernel
 from aframe_env.dynamics.waves import draw_wave, respond, response_cell
 from aframe_env.motion import ComplexArray, Components, FloatArray
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
@@ -26,6 +26,8 @@ from aframe_env.vessel import Vessel
 Spectrum = Literal["jonswap", "pierson-moskowitz"]
 SPECTRA: tuple[str, ...] = ("jonswap", "pierson-moskowitz")
 
+FULL_TURN = 2.0 * math.pi
+"""rad."""
 LEAST_GAMMA: Final = 1.0
 GAMMA_STEP: Final = 0.1
 """Quantiles of frequency are tabulated for peak enhancement factors so far apart."""
@@ -50,7 +52,8 @@ class Sea:
     tp: float
     """Peak period, s."""
     heading: float = math.pi
-    """Direction that the waves travel towards, rad from the ship's bow towards port: 0 following, π head sea."""
+    """Direction that the waves travel towards, rad from the ship's bow towards port, in ±2π: 0 following sea, π head
+    sea."""
     spectrum: str = "jonswap"
     gamma: float = 3.3
     """Peak enhancement factor of the JONSWAP spectrum; 1 makes it Pierson-Moskowitz."""
@@ -64,7 +67,7 @@ class Sea:
     def __post_init__(self) -> None:
         require_number("hs", self.hs, "m", low=0.0, high=30.0)
         require_number("tp", self.tp, "s", low=2.0, high=40.0)
-        require_number("heading", self.heading, "rad")
+        require_number("heading", self.heading, "rad", low=-FULL_TURN, high=FULL_TURN)
         require_choice("spectrum", self.spectrum, SPECTRA)
         require_number("gamma", self.gamma, "", low=1.0, high=10.0)
         if self.spreading is not None:
@@ -152,17 +155,14 @@ def _shape_grid() -> FloatArray:
 
 
 def _shape(x: npt.ArrayLike, gamma: float) -> FloatArray:
-    """JONSWAP's shape over ω/ω_p (not normalised)."""
-    from waveresponse import JONSWAP
-
+    """JONSWAP's shape over x = ω/ω_p: the density with Hs = 4 m and ω_p = 1 rad/s, DNV-RP-C205, 3.5.5."""
+    # waveresponse has it too, but importing that takes longer than all else that a first reset does.
     x = np.asarray(x, dtype=np.float64)
     positive = np.where(x > 0.0, x, 1.0)
-    flat = np.atleast_1d(positive).ravel()
-    order = np.argsort(flat)
-    values = np.empty_like(flat)
-    _, density = JONSWAP(flat[order])(4.0, 2.0 * math.pi, gamma=gamma)
-    values[order] = density
-    return np.where(x > 0.0, values.reshape(positive.shape), 0.0)
+    width = np.where(positive <= 1.0, 0.07, 0.09)
+    pierson_moskowitz = 5.0 / positive**5 * np.exp(-1.25 / positive**4)
+    enhancement = gamma ** np.exp(-0.5 * ((positive - 1.0) / width) ** 2)
+    return np.where(x > 0.0, (1.0 - 0.287 * np.log(gamma)) * pierson_moskowitz * enhancement, 0.0)
 
 
 def _inverse(grid: FloatArray, density: FloatArray) -> FloatArray:
@@ -197,8 +197,6 @@ class _SeaKernels(NamedTuple):
 
 @cache
 def _sea_kernels() -> _SeaKernels:
-    source: Any = source_digest()
-
     @kernel
     def realise(
         seed: int,
@@ -209,7 +207,6 @@ def _sea_kernels() -> _SeaKernels:
         heading: float,
         direction_table: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        source  # noqa: B018
         frequency = np.empty(components)
         direction = np.empty(components)
         phase = np.empty(components)
@@ -229,7 +226,6 @@ def _sea_kernels() -> _SeaKernels:
         grid_heading: FloatArray,
         table: ComplexArray,
     ) -> ComplexArray:
-        source  # noqa: B018
         response = np.empty((frequency.shape[0], 6), dtype=np.complex128)
         for k in range(frequency.shape[0]):
             i, u, j, v = response_cell(grid_frequency, grid_heading, frequency[k], direction[k])

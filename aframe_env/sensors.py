@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.dynamics.compiling import kernel, source_digest
+from aframe_env.dynamics.compiling import kernel
 from aframe_env.random import normal
 from aframe_env.validation import InvalidValue, require_number
 
@@ -155,11 +155,9 @@ class SensorBank:
 
 @cache
 def _read_kernel():  # type: ignore[no-untyped-def]
-    source = source_digest()
 
     @kernel
     def read(memory, weight, noise, relative, keep, hold, resolution, seed, count, error, reading):  # type: ignore[no-untyped-def]
-        source  # noqa: B018
         rows, past, channels = memory.shape
         for i in range(rows):
             for c in range(channels):

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.compiling import kernel, scalar, source_digest
+from aframe_env.dynamics.compiling import kernel, scalar
 from aframe_env.dynamics.flexible import readout
 from aframe_env.sensors import CHANNELS, Sensors
 
@@ -164,11 +164,9 @@ def read_out(row: Any, lanes: int, j: int, state: Any, results: Any, i: int) -> 
 @cache
 def report_kernel(lanes: int) -> Callable[..., None]:
     """Kernel (blocks, episode duration, state (N, 14), results (N, RESULTS)) that reads the rows out."""
-    source: Any = source_digest()
 
     @kernel
     def report(blocks, episode_duration, state, results):  # type: ignore[no-untyped-def]
-        source  # noqa: B018
         for i in range(state.shape[0]):
             charge_parted(blocks[i // lanes], episode_duration, lanes, i % lanes)
             read_out(blocks[i // lanes], lanes, i % lanes, state, results, i)

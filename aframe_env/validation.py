@@ -6,6 +6,9 @@ import math
 from numbers import Real
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 
 class SmallRotationWarning(UserWarning):
     """An rfe of the full model has turned by more than the linear kinematics of eq. (10) can take."""
@@ -56,6 +59,14 @@ def require_vector(name: str, value: Any, unit: str, size: int = 3) -> None:
         raise InvalidValue(f"{name} = {value!r}: must be {size} numbers in {unit}")
     for index, item in enumerate(value):
         require_number(f"{name}[{index}]", item, unit)
+
+
+def require_numbers(name: str, value: Any, unit: str) -> npt.NDArray[np.float64]:
+    """Return an array of any shape as float64. Raises where it holds what is no number."""
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidValue(f"{name} = {value!r}: must be an array of numbers, {unit}") from None
 
 
 def require_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:

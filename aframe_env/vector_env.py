@@ -17,7 +17,7 @@ from aframe_env.env import EnvState
 from aframe_env.rendering import open_renderer
 from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.simulation import Simulation
-from aframe_env.validation import InvalidValue, require_choice, require_integer
+from aframe_env.validation import InvalidValue, require_choice, require_integer, require_numbers
 
 if TYPE_CHECKING:
     from aframe_env.rendering.renderer import Renderer
@@ -227,7 +227,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         self._simulation.reset_rows(indices, drawn)
 
     def _commands(self, actions: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
-        commands = np.asarray(actions, dtype=np.float64)
+        commands = require_numbers("actions", actions, "rad/s")
         if commands.shape != (self.num_envs, 1):
             raise InvalidValue(f"actions of shape {commands.shape}: must be of shape ({self.num_envs}, 1), rad/s")
         commands = commands[:, 0]

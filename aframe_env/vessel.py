@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from importlib.resources import files
 from pathlib import Path
@@ -39,11 +39,11 @@ class Vessel:
     """
 
     name: str
-    frequencies: FloatArray
+    frequencies: FloatArray = field(repr=False)
     """(F,) rad/s, rising."""
-    headings: FloatArray
+    headings: FloatArray = field(repr=False)
     """(D,) rad, rising from 0 to 2π."""
-    response: ComplexArray
+    response: ComplexArray = field(repr=False)
     """(F, D, 6) surge, sway, heave [m/m], roll, pitch, yaw [rad/m] of the reference point."""
     reference_point: tuple[float, float, float]
     """m, in ship axes."""
@@ -162,14 +162,19 @@ def _check_row(row: list[float], where: str) -> None:
 def _grid(rows: FloatArray, path: Path) -> tuple[FloatArray, FloatArray, ComplexArray]:
     """Frequencies, headings over the full circle, response, from the rows of a file."""
     frequencies, degrees = np.unique(rows[:, 0]), np.unique(rows[:, 1])
-    if len(frequencies) < 2 or len(rows) != len(frequencies) * len(degrees):
+    if len(frequencies) < 2:
+        raise InvalidValue(f"{path}: {len(frequencies)} frequency: must be at least 2")
+    place = np.searchsorted(frequencies, rows[:, 0]) * len(degrees) + np.searchsorted(degrees, rows[:, 1])
+    times = np.bincount(place, minlength=len(frequencies) * len(degrees))
+    if (times != 1).any():
+        first = int(np.flatnonzero(times != 1)[0])
+        omega, heading = frequencies[first // len(degrees)], degrees[first % len(degrees)]
+        there = "is missing" if times[first] == 0 else f"is there {times[first]} times"
         raise InvalidValue(
-            f"{path}: {len(rows)} rows for {len(frequencies)} frequencies and {len(degrees)} headings: every "
-            "combination must be there once, with at least 2 frequencies"
+            f"{path}: the row of {omega:g} rad/s and {heading:g}° {there}: each of the {len(frequencies)} frequencies "
+            f"must be there once with each of the {len(degrees)} headings"
         )
-    ordered = rows[np.lexsort((rows[:, 1], rows[:, 0]))].reshape(len(frequencies), len(degrees), -1)
-    if not np.array_equal(ordered[:, :, 1], np.broadcast_to(degrees, ordered.shape[:2])):
-        raise InvalidValue(f"{path}: a combination of frequency and heading is missing or there twice")
+    ordered = rows[np.argsort(place)].reshape(len(frequencies), len(degrees), -1)
     response = ordered[:, :, 2::2] * np.exp(1j * ordered[:, :, 3::2])
     if degrees[0] == 0.0 and degrees[-1] == 180.0:
         degrees = np.concatenate([degrees, 360.0 - degrees[-2::-1]])

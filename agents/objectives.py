@@ -10,13 +10,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.compiling import kernel, scalar, source_digest
+from aframe_env.dynamics.compiling import kernel, scalar
 from aframe_env.dynamics.integrator import rk4_step
 from aframe_env.engine import Engine
 from aframe_env.motion import require_coverage
@@ -92,7 +92,6 @@ def _advance(x1, x2, x3, v1, v2, v3, a, b, c, angles, speeds, p, h):  # type: ig
 
 @cache
 def _kernel() -> Callable[..., tuple[float, float, float]]:
-    source: Any = source_digest()
 
     @kernel
     def evaluate(
@@ -104,7 +103,6 @@ def _kernel() -> Callable[..., tuple[float, float, float]]:
         h: float,
         errors: FloatArray,
     ) -> tuple[float, float, float]:
-        source  # noqa: B018
         target = p[0]
         x1, x2, x3, v1, v2, v3 = start
         omega1 = 0.0
@@ -129,7 +127,6 @@ def _kernel() -> Callable[..., tuple[float, float, float]]:
 
 @cache
 def _lanes_kernel() -> Callable[..., None]:
-    source: Any = source_digest()
 
     @kernel
     def evaluate(
@@ -143,7 +140,6 @@ def _lanes_kernel() -> Callable[..., None]:
         h: float,
         errors: FloatArray,
     ) -> None:
-        source  # noqa: B018
         target = p[0]
         lanes = more_angle.shape[1]
         x1, x2, x3 = np.full(lanes, start[0]), np.full(lanes, start[1]), np.full(lanes, start[2])

@@ -140,3 +140,6 @@ def test_bad_actions() -> None:
         env.step(np.array([np.nan], dtype=np.float32))
     with pytest.raises(InvalidValue, match="shape"):
         env.step(np.zeros(2, dtype=np.float32))
+    for action in ("left", ["x"], {"speed": 1.0}):
+        with pytest.raises(InvalidValue, match=r"action = .*: must be an array of numbers, rad/s"):
+            env.step(action)  # type: ignore[arg-type]

@@ -127,6 +127,7 @@ def test_scenarios_for_all_rows_and_for_each() -> None:
     ("call", "message"),
     [
         (lambda env: env.step(np.zeros((3, 1))), r"actions of shape \(3, 1\): must be of shape \(2, 1\), rad/s"),
+        (lambda env: env.step("left"), "actions = 'left': must be an array of numbers, rad/s"),
         (lambda env: env.step(np.array([[0.0], [np.nan]])), r"actions\[1\] = nan rad/s: must be finite"),
         (lambda env: env.step(np.array([[np.inf], [0.0]])), r"actions\[0\] = inf rad/s: must be finite"),
         (lambda env: env.reset(seed=[1]), "seed: 1 seeds for 2 rows"),

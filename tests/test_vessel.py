@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from waveresponse import JONSWAP
 
+from aframe_env.sea import Sea, SeaMotion
 from aframe_env.validation import InvalidValue
 from aframe_env.vessel import COLUMNS, Vessel
 
@@ -22,7 +23,7 @@ def mss_response() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     The source has x forward, y to starboard, z down: sway, heave, pitch and yaw change sign. Its elevation is
     positive upwards, its heading 180° a head sea, as here.
     """
-    data = np.loadtxt(MSS, delimiter=",", skiprows=5)
+    data = np.loadtxt(MSS, delimiter=",", skiprows=6)
     frequencies, headings = np.unique(data[:, 0]), np.unique(data[:, 1])
     data = data[np.lexsort((data[:, 1], data[:, 0]))].reshape(len(frequencies), len(headings), 14)
     response = data[:, :, 2::2] * np.exp(1j * data[:, :, 3::2])
@@ -147,7 +148,8 @@ def test_own_vessel(tmp_path: Path) -> None:
         (("0.5,45,1.0", "0.5,45,-1.0"), r"line 5: surge_amp = -1: must not be negative"),
         (("0.5,45,", "0.5,450,"), r"line 5: heading_deg = 450°"),
         (("0.5,45,", "-0.5,45,"), r"line 5: omega_rad_s = -0.5 rad/s"),
-        (("0.5,45,", "0.5,0,"), r"there twice"),
+        (("0.5,45,", "0.5,0,"), r"the row of 0.5 rad/s and 0° is there 2 times"),
+        (("0.5,45," + ",".join(["1.0", "0.5"] * 6), ""), r"the row of 0.5 rad/s and 45° is missing"),
         (("omega_rad_s", "omega"), r"line 3: the columns must be"),
         (("# reference_point_m: 1, 0, -2", "# reference_point_m: 1, 0"), r"line 2: reference_point_m"),
         (("0.5,45,1.0,", "0.5,45,"), r"line 5: 13 columns: must be 14"),
@@ -158,6 +160,12 @@ def test_bad_vessel_names_file_and_line(tmp_path: Path, change: tuple[str, str],
     path.write_text(_text(change))
     with pytest.raises(InvalidValue, match=message):
         Vessel.from_csv(path)
+
+
+def test_repr_leaves_the_tables_out() -> None:
+    text = repr(SeaMotion(sea=Sea(hs=2.0, tp=8.0)))
+    assert Vessel.supply().name in text
+    assert "array" not in text
 
 
 def test_missing_vessel(tmp_path: Path) -> None:

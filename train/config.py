@@ -54,8 +54,18 @@ def parse(kind: type[T], description: str, args: Sequence[str] | None = None) ->
             del args[index : index + (1 if value else 2)]
             break
     epilog = description + "\n\n--config FILE.toml reads the options from a file; the rest overrides it."
+    prog = _prog(kind)
     return (
-        tyro.cli(kind, args=args, description=epilog, default=default)
+        tyro.cli(kind, prog=prog, args=args, description=epilog, default=default)
         if default
-        else tyro.cli(kind, args=args, description=epilog)
+        else tyro.cli(kind, prog=prog, args=args, description=epilog)
     )
+
+
+def _prog(kind: type) -> str:
+    """The command whose options these are, as one calls it."""
+    module = kind.__module__
+    if module == "__main__":
+        spec = sys.modules[module].__spec__
+        module = Path(sys.argv[0]).stem if spec is None else spec.name
+    return f"python -m {module}"

@@ -56,6 +56,15 @@ def new_folder(path: Path, *, overwrite: bool = False) -> Path:
     return path
 
 
+def new_file(path: Path, *, overwrite: bool = False) -> Path:
+    """Return the path of an output file; one that exists is refused unless ``overwrite``."""
+    if path.is_dir():
+        raise InvalidValue(f"out = {str(path)!r}: is a folder, must be a file")
+    if path.exists() and not overwrite:
+        raise InvalidValue(f"out = {str(path)!r}: exists; choose another, or pass --overwrite")
+    return path
+
+
 def versions() -> dict[str, str]:
     """Versions of what a result depends on, to the last digit."""
     return {

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ import aframe_env
 from aframe_env.scenario import ScenarioDistribution
 from aframe_env.validation import InvalidValue, require_integer, require_number
 from train.config import parse
-from train.output import user_errors, write_atomically
+from train.output import new_file, user_errors, write_atomically
 
 _CATCH_UP = 0.5
 """Speed at which the rope paid out catches up with each metre of the pulley's heave, 1/s."""
@@ -31,8 +32,10 @@ _CATCH_UP = 0.5
 class Options:
     """The scenario and the moment."""
 
-    out: Path = Path("results/environment.png")
-    """PNG to write."""
+    out: Path | None = None
+    """PNG to write; by default runs/environment-DATE-TIME.png."""
+    overwrite: bool = False
+    """Write the PNG even if there is one of that name."""
     scenario_seed: int = 1
     """Draws the sea and the rope's length."""
     time: float = 56.0
@@ -80,9 +83,12 @@ def run(options: Options, console: Console) -> int:
     """Draw and write."""
     from matplotlib.image import imsave
 
+    out = new_file(
+        options.out or Path("runs") / f"environment-{datetime.now():%Y%m%d-%H%M%S}.png", overwrite=options.overwrite
+    )
     frame = picture(options)
-    write_atomically(options.out, lambda temporary: imsave(temporary, frame))
-    console.print(f"picture: {options.out}")
+    write_atomically(out, lambda temporary: imsave(temporary, frame))
+    console.print(f"picture: {out}")
     return 0
 
 

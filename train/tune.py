@@ -161,10 +161,11 @@ def search(options: Options, console: Console) -> optuna.Study:
     study = optuna.create_study(
         storage=storage,
         study_name=f"{options.algorithm}-{options.observation}",
-        sampler=optuna.samplers.TPESampler(seed=options.seed),
         direction="maximize",
         load_if_exists=True,
     )
+    # A search that goes on must not draw its first trials again.
+    study.sampler = optuna.samplers.TPESampler(seed=options.seed + len(study.trials))
     if not study.trials:
         study.enqueue_trial({name: getattr(tunable.defaults, name) for name in names})
 

@@ -1,12 +1,13 @@
 """Verification of the full model: ``python -m train.verify``.
 
 Without a file it runs every check against closed forms and independent programs and writes a table
-(README.md, verification.json) and pictures into ``--folder``, default results/verification. The exit status
-is 1 if a bar does not hold. With a file it runs that one case and writes its JSON:
+(README.md, verification.json) and pictures into ``--folder``, default runs/verify-DATE-TIME. The exit status
+is 1 if a bar does not hold. With a file it runs that one case and prints its result as JSON, or writes it
+into the file that ``--out`` names:
 
-    python -m train.verify --load-case case.toml --out case.json
-    python -m train.verify --release case.toml --out case.json
-    python -m train.verify --dynamic case.toml --out case.json
+    python -m train.verify --load-case case.toml
+    python -m train.verify --release case.toml --out release.json
+    python -m train.verify --dynamic case.toml --out run.json
 
 A static case's JSON has the keys of the reference data's cases (aframe_env/data/reference/static.json) and,
 under ``along``, section forces and von Mises stress along the frame. In ``sec_before_…`` and ``sec_after_…``
@@ -17,18 +18,20 @@ program. The other two kinds have one list a column, with the column names of th
 from __future__ import annotations
 
 import argparse
+import json
 import platform
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scipy
 
-from train.output import user_errors, write_json, write_text
+from train.output import new_file, new_folder, user_errors, write_json, write_text
 from train.verification import frame_checks, run_checks
 from train.verification.cases import (
     FORMAT,
@@ -116,21 +119,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
     kind.add_argument("--load-case", type=Path, metavar="FILE.toml", help="run one static load case")
     kind.add_argument("--release", type=Path, metavar="FILE.toml", help="run one release of a static load")
     kind.add_argument("--dynamic", type=Path, metavar="FILE.toml", help="run one case with ship motion")
-    parser.add_argument("--out", type=Path, metavar="FILE.json", help="where that case's result goes")
-    parser.add_argument("--folder", type=Path, default=Path("results/verification"), help="where table and pictures go")
+    parser.add_argument("--out", type=Path, metavar="FILE.json", help="where that case's result goes; else printed")
+    parser.add_argument("--folder", type=Path, help="where table and pictures go; by default runs/verify-DATE-TIME")
+    parser.add_argument("--overwrite", action="store_true", help="write even where there is something")
     given = parser.parse_args(arguments)
     with user_errors():
         for name, solve in CASE_KINDS.items():
             path: Path | None = getattr(given, name)
-            if path is not None:
-                if given.out is None:
-                    parser.error(f"--{name.replace('_', '-')} needs --out FILE.json")
-                write_json(given.out, without_nan(solve(read_toml(path), path.parent)))
-                return 0
+            if path is None:
+                continue
+            if given.folder is not None:
+                parser.error("--folder goes without --load-case, --release and --dynamic: name a file by --out")
+            out = None if given.out is None else new_file(given.out, overwrite=given.overwrite)
+            result = without_nan(solve(read_toml(path), path.parent))
+            if out is None:
+                print(json.dumps(result, indent=2, allow_nan=False))
+            else:
+                write_json(out, result)
+                print(f"result: {out}")
+            return 0
         if given.out is not None:
             parser.error("--out goes with --load-case, --release or --dynamic")
+        folder = new_folder(
+            given.folder or Path("runs") / f"verify-{datetime.now():%Y%m%d-%H%M%S}", overwrite=given.overwrite
+        )
         checks = run_all()
-        write_report(checks, given.folder)
+        write_report(checks, folder)
+        print(f"written: {folder}")
         return 0 if all(check.passed for check in checks) else 1
 
 

@@ -12,6 +12,7 @@ import io
 import math
 import sys
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from rich.progress import track
 from aframe_env.validation import InvalidValue, require_integer, require_number
 from aframe_env.vessel import COLUMNS, Vessel
 from train.config import parse
-from train.output import user_errors, write_atomically, write_text
+from train.output import new_file, user_errors, write_atomically, write_text
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -37,12 +38,16 @@ DOFS = ("Surge", "Sway", "Heave", "Roll", "Pitch", "Yaw")
 class Options:
     """The hull and the calculation."""
 
-    out: Path = Path("aframe_env/data/supply_vessel.csv")
-    """CSV to write."""
+    out: Path | None = None
+    """CSV to write; by default runs/vessel-DATE-TIME.csv."""
+    overwrite: bool = False
+    """Write CSV or picture even if there is a file of that name."""
     plot: Path | None = None
-    """Picture to draw of the CSV in ``out``, in place of a calculation."""
+    """Picture to draw of a vessel, in place of a calculation."""
+    vessel: Path | None = None
+    """CSV of the vessel to draw; the package's own by default."""
     compare: Path | None = None
-    """Another vessel's CSV of the same format to draw beside it."""
+    """CSV of another vessel to draw beside it."""
     length: float = 83.0
     """Length between perpendiculars, m."""
     beam: float = 19.2
@@ -284,6 +289,14 @@ def draw(vessel: Vessel, other: Vessel | None, path: Path) -> None:
         axis.set_ylim(bottom=0.0)
         if dof == 3:
             axis.set_ylim(0.0, 14.0)
+            axis.annotate(
+                "bounded by the damping\nalone: see below",
+                (0.97, 0.93),
+                xycoords="axes fraction",
+                ha="right",
+                va="top",
+                fontsize=8,
+            )
         if dof in (0, 1, 5):
             axis.set_ylim(0.0, 1.2 if dof != 5 else 2.0)
         axis.grid(alpha=0.3)
@@ -292,19 +305,28 @@ def draw(vessel: Vessel, other: Vessel | None, path: Path) -> None:
     axes[0, 0].legend(title="heading (180° = head sea)", fontsize=8, ncols=2)
     beside = f"; dotted: {other.name}" if other is not None else ""
     figure.suptitle(f"Motion response: {vessel.name}, at its centre of gravity{beside}")
+    figure.supxlabel(
+        "At its natural period only damping bounds the roll, and potential theory has next to none: the height of the "
+        "peak\nis inversely proportional to the damping that was assumed, for the default vessel "
+        f"{Options.roll_damping:.0%} of critical.",
+        fontsize=9,
+    )
     write_atomically(path, lambda temporary: figure.savefig(temporary, dpi=130))
 
 
 def run(options: Options, console: Console) -> int:
     """Compute, or draw."""
     if options.plot is not None:
-        other = Vessel.from_csv(options.compare) if options.compare is not None else None
-        draw(Vessel.from_csv(options.out), other, options.plot)
+        picture = new_file(options.plot, overwrite=options.overwrite)
+        vessel = Vessel.supply() if options.vessel is None else Vessel.from_csv(options.vessel)
+        draw(vessel, None if options.compare is None else Vessel.from_csv(options.compare), picture)
         console.print(f"picture: {options.plot}")
         return 0
-    text = to_csv(options, *compute(options, console))
-    write_text(options.out, text)
-    console.print(f"vessel: {options.out}")
+    out = new_file(
+        options.out or Path("runs") / f"vessel-{datetime.now():%Y%m%d-%H%M%S}.csv", overwrite=options.overwrite
+    )
+    write_text(out, to_csv(options, *compute(options, console)))
+    console.print(f"vessel: {out}")
     return 0
 
 

@@ -1,21 +1,37 @@
-"""How the physics is compiled: decorators for scalar functions and kernels, and a cache that is never stale."""
+"""How the physics is compiled: decorators for scalar functions and kernels, and a cache that is never stale.
+
+numba keeps what it has compiled in ``NUMBA_CACHE_DIR``, else beside the sources, else, where they are read-only, in the
+user's cache folder. Where none of these can be written to, each process compiles for itself.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import logging
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import config, njit, types
+from numba.core import event
 from numba.extending import intrinsic
+
+_LOGGER = logging.getLogger("aframe_env")
+
+_kernels: set[Callable[..., Any]] = set()
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 # No fastmath: a row must give the same bits in a batch, alone, and in any block. Division follows IEEE 754,
 # since a check for zero in the inner loop would keep it from being vectorised.
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": False, "boundscheck": False, "nogil": True}
+_OPTIONS: dict[str, Any] = {
+    "error_model": "numpy",
+    "fastmath": False,
+    "boundscheck": False,
+    "nogil": True,
+    "no_cfunc_wrapper": True,  # nobody passes a kernel's address on, and it takes time to compile
+}
 
 
 def scalar(function: F) -> F:
@@ -25,12 +41,56 @@ def scalar(function: F) -> F:
 
 def kernel(function: F) -> F:
     """Compile a loop over rows, cached on disk."""
-    return cast(F, njit(cache=True, **_OPTIONS)(function))
+    return _cached(function)
 
 
 def parallel_kernel(function: F) -> F:
     """Compile a loop over rows that spreads over the cores, cached on disk."""
-    return cast(F, njit(cache=True, parallel=True, **_OPTIONS)(function))
+    return _cached(function, parallel=True)
+
+
+def _cached(function: F, **options: Any) -> F:
+    # numba numbers a function's variants (other sources, other lanes) in one index, without a lock: of two processes
+    # that compile at once, one could later be given the other's variant. A name of its own for each keeps them apart.
+    cells = [cell.cell_contents for cell in function.__closure__ or ()]
+    own_source = Path(function.__code__.co_filename).read_bytes()
+    variant = hashlib.sha256(f"{source_digest()} {cells!r} ".encode() + own_source).hexdigest()[:16]
+    function.__qualname__ += f"-{variant}"
+    _kernels.add(function)
+    try:
+        return cast(F, njit(cache=True, **options, **_OPTIONS)(function))
+    except RuntimeError:  # no cache folder can be written to
+        return cast(F, njit(**options, **_OPTIONS)(function))
+
+
+class _Announcer(event.Listener):
+    """Says once in a process that it compiles: nothing else would be seen for many seconds."""
+
+    def __init__(self) -> None:
+        self._silent = False
+
+    def on_start(self, event: Any) -> None:
+        """Of the compilation of a kernel that the cache has not."""
+        dispatcher = event.data["dispatcher"]
+        if self._silent or dispatcher.py_func not in _kernels:
+            return
+        self._silent = True
+        folder = dispatcher.stats.cache_path
+        kept = (
+            f"later runs find it in {folder}"
+            if folder
+            else "nothing can be kept, as no cache folder can be written to: set NUMBA_CACHE_DIR to one"
+        )
+        # A warning, since information is not shown by default.
+        _LOGGER.warning(
+            "aframe_env: compiling the physics for this processor, which takes up to half a minute; %s", kept
+        )
+
+    def on_end(self, event: Any) -> None:
+        """Nothing to say."""
+
+
+event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]
 
 
 def _fused(typing_context, a, b, c):  # type: ignore[no-untyped-def]
@@ -63,8 +123,7 @@ def fma(a: float, b: float, c: float) -> float:
 def source_digest() -> str:
     """Digest of the sources of whatever compiled code calls: the physics, and the random numbers.
 
-    numba invalidates a cached kernel when the kernel's own file changes, not when a function that it calls does.
-    A kernel that closes over this digest is compiled anew after any change.
+    numba finds a cached kernel stale when the kernel's own file changes, not when a function that it calls does.
     """
     digest = hashlib.sha256()
     physics = Path(__file__).parent

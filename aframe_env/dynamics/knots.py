@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.compiling import kernel, scalar, source_digest
+from aframe_env.dynamics.compiling import kernel, scalar
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -87,7 +87,6 @@ class KnotKernels(NamedTuple):
 @cache
 def knot_kernels() -> KnotKernels:
     """Compile, or take from the cache."""
-    source: Any = source_digest()
 
     @kernel
     def segments(
@@ -97,7 +96,6 @@ def knot_kernels() -> KnotKernels:
         segment: float,
         ramp: float,
     ) -> int:
-        source  # noqa: B018
         bound = 0.0
         for k in range(frequency.shape[0]):
             r = response[k]
@@ -106,7 +104,6 @@ def knot_kernels() -> KnotKernels:
 
     @kernel
     def write(row: FloatArray, frequency: FloatArray, response: ComplexArray, interval: float) -> None:
-        source  # noqa: B018
         for k in range((row.shape[0] - at.ROW_SLOTS) // at.COMPONENT_SLOTS):
             set_turning(row, 1, 0, k, frequency[k] if k < frequency.shape[0] else 0.0, interval)
             if k < frequency.shape[0]:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from numba import prange
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.compiling import fma, kernel, parallel_kernel, scalar, source_digest
+from aframe_env.dynamics.compiling import fma, kernel, parallel_kernel, scalar
 from aframe_env.dynamics.integrator import RopeEnd, rk4_step
 from aframe_env.dynamics.layout import LANES, Span
 from aframe_env.dynamics.motion import advance_motion, deck_coordinate, end_motion, on_path, start_motion
@@ -245,30 +245,25 @@ class StepKernels(NamedTuple):
 @cache
 def step_kernels(lanes: int = LANES) -> StepKernels:
     """Kernels for blocks of ``lanes`` rows (LANES for a batch, 1 for a single row)."""
-    source: Any = source_digest()
     span = Span(lanes, 0, lanes)
 
     @kernel
     def step(blocks: Array, components: int, segments: int, records: Array) -> None:
-        source  # noqa: B018  (a changed digest makes a new cache entry)
         for block in range(blocks.shape[0]):
             control_step(blocks[block], components, segments, records, span)
 
     @parallel_kernel
     def step_parallel(blocks: Array, components: int, segments: int, records: Array) -> None:
-        source  # noqa: B018
         for block in prange(blocks.shape[0]):
             control_step(blocks[block], components, segments, records, span)
 
     @kernel
     def start(blocks: Array, components: int, records: Array) -> None:
-        source  # noqa: B018
         for block in range(blocks.shape[0]):
             start_rows(blocks[block], components, records, span)
 
     @kernel
     def deck(blocks: Array, coordinates: Array) -> None:
-        source  # noqa: B018
         for i in range(coordinates.shape[0]):
             for dof in range(6):
                 coordinates[i, dof] = deck_coordinate(blocks[i // lanes], dof, lanes, i % lanes)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from aframe_env.crane import Crane
-from aframe_env.dynamics.compiling import kernel, scalar, source_digest
+from aframe_env.dynamics.compiling import kernel, scalar
 from aframe_env.dynamics.winch import drum_state, plan
 from agents.estimation import ALL, FloatArray, Rows
 
@@ -88,17 +88,13 @@ def command_for(turn: float, speed: float, limit: float, acceleration: float, la
 
 @cache
 def _kernels() -> _Kernels:
-    source: Any = source_digest()
-
     @kernel
     def invert(speed, limit, acceleration, lag, period, turn, command):  # type: ignore[no-untyped-def]
-        source  # noqa: B018
         for i in range(turn.shape[0]):
             command[i] = command_for(turn[i], speed[i], limit[i], acceleration[i], lag[i], period)
 
     @kernel
     def follow(speed, acceleration, lag, period, command, turned):  # type: ignore[no-untyped-def]
-        source  # noqa: B018
         for i in range(command.shape[0]):
             turned[i], speed[i] = _advance(command[i], speed[i], acceleration[i], lag[i], period)
 

@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -54,6 +56,16 @@ def test_a_bad_file_is_named_with_its_key(text, words, tmp_path):
     with pytest.raises(InvalidValue, match=words) as caught:
         read_toml(path, Options)
     assert str(path) in str(caught.value)
+
+
+def test_usage_names_the_command_as_one_calls_it(capsys):
+    with pytest.raises(SystemExit):
+        parse(ppo.Options, "", ["--help"])
+    assert "python -m train.ppo [" in capsys.readouterr().out
+    command = [sys.executable, "-m", "train.vessel", "--frequencies", "many"]
+    usage = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert usage.returncode == 2
+    assert "python -m train.vessel" in usage.stderr + usage.stdout
 
 
 def test_a_missing_file():

@@ -7,7 +7,7 @@ from agents.tuned_drives import TUNED
 from train import evaluate
 
 RESULTS = Path(__file__).parents[2] / "results"
-AGENT, MAP = RESULTS / "ppo", RESULTS / "drive-map"
+AGENT, MAP = RESULTS / "agents" / "ppo" / "seed-0", RESULTS / "drive-map"
 
 
 def command(monkeypatch, *arguments):

@@ -3,7 +3,7 @@ import json
 import pytest
 
 from aframe_env import InvalidValue
-from train.output import new_folder, user_errors, write_atomically, write_json, write_text
+from train.output import new_file, new_folder, user_errors, write_atomically, write_json, write_text
 
 
 def test_a_write_that_fails_keeps_the_old_file_and_leaves_nothing_else(tmp_path):
@@ -49,6 +49,17 @@ def test_folders(tmp_path):
     assert new_folder(folder, overwrite=True) == folder
     with pytest.raises(InvalidValue, match="is a file"):
         new_folder(folder / "x")
+
+
+def test_files(tmp_path):
+    path = tmp_path / "x.json"
+    assert new_file(path) == path
+    path.write_text("mine")
+    with pytest.raises(InvalidValue, match="exists; choose another, or pass --overwrite"):
+        new_file(path)
+    assert new_file(path, overwrite=True) == path
+    with pytest.raises(InvalidValue, match="is a folder"):
+        new_file(tmp_path, overwrite=True)
 
 
 @pytest.mark.parametrize("error", [InvalidValue("mass = -1 kg"), OSError(28, "No space left on device")])

@@ -21,6 +21,20 @@ def test_writes_the_picture(tmp_path: Path) -> None:
     assert [path.name for path in options.out.parent.iterdir()] == ["picture.png"]
 
 
+def test_refuses_to_overwrite_unasked(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.png"
+    mine.write_text("mine")
+    with pytest.raises(InvalidValue, match="exists; choose another, or pass --overwrite"):
+        run(Options(out=mine), Console(quiet=True))
+    assert mine.read_text() == "mine"
+
+
+def test_writes_into_runs_by_default(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(Options(time=1.0), Console(quiet=True)) == 0
+    assert [path.parent.name for path in tmp_path.rglob("*.png")] == ["runs"]
+
+
 def test_refuses_a_time_before_the_start() -> None:
     with pytest.raises(InvalidValue, match="time"):
         Options(time=-1.0)

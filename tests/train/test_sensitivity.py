@@ -168,7 +168,7 @@ def test_the_command_writes_curves_and_indices(tmp_path, monkeypatch):
     ("options", "words"),
     [
         (("--samples", "100"), "samples = 100: must be a power of two"),
-        (("--policies", "S-Ω3"), "policies: 'S-Ω3': must be one of 'drum still', 'S-Ω1'"),
+        (("--policies", "S-Ω3"), "policy = 'S-Ω3': must be one of 'drum still', 'S-Ω1'"),
         (("--policies", "S-Ω1", "S-Ω1"), "each named once"),
         (("--policies", "drive map", "--drive-map", "absent"), "no drive map in 'absent'"),
     ],

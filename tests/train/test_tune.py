@@ -34,10 +34,12 @@ def test_a_search_goes_on_where_it_ended(tmp_path, monkeypatch):
     defaults = tune.TUNABLE["ppo"].defaults
     assert float(first[0]["learning_rate"]) == defaults.learning_rate
     assert float(both[1]["learning_rate"]) != defaults.learning_rate
-    best = max(float(trial["median"]) for trial in both)
+
+    assert command(monkeypatch, *TINY, "--trials", 3, "--out", out) == 0
+    assert trials(out)[2]["learning_rate"] not in [trial["learning_rate"] for trial in both]
     table = (out / "study.md").read_text().splitlines()
-    assert f"{best:.2%}" in table[2]
-    assert len(table) == 4
+    assert f"{max(float(trial['median']) for trial in trials(out)):.2%}" in table[2]
+    assert len(table) == 5
 
 
 def test_another_search_in_the_same_folder_is_refused(tmp_path, monkeypatch, capsys):

@@ -72,6 +72,30 @@ def test_errors_reach_the_user_without_a_traceback(tmp_path, capsys):
         assert words in capsys.readouterr().err
 
 
+def test_a_case_is_printed_or_written_but_not_over_another(tmp_path, capsys):
+    case, out = tmp_path / "case.toml", tmp_path / "out.json"
+    case.write_text("rfes = [2, 2]\n")
+    assert main(["--load-case", str(case)]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert main(["--load-case", str(case), "--out", str(out)]) == 0
+    assert str(out) in capsys.readouterr().out
+    assert json.loads(out.read_text()) == printed
+    out.write_text("mine")
+    with pytest.raises(SystemExit, match="2"):
+        main(["--load-case", str(case), "--out", str(out)])
+    assert "--overwrite" in capsys.readouterr().err
+    assert out.read_text() == "mine"
+    assert main(["--load-case", str(case), "--out", str(out), "--overwrite"]) == 0
+    assert json.loads(out.read_text()) == printed
+
+
+def test_a_folder_with_something_in_it_is_refused_before_the_checks_run(tmp_path, capsys):
+    (tmp_path / "mine").touch()
+    with pytest.raises(SystemExit, match="2"):
+        main(["--folder", str(tmp_path)])
+    assert "--overwrite" in capsys.readouterr().err
+
+
 def test_full_disk_is_one_line(tmp_path, capsys, monkeypatch):
     def full(path, data):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))

@@ -56,11 +56,11 @@ def _drives(path: Path, experiment: Experiment, drives: Sequence[Result], radius
     for index, result in enumerate(drives):
         if result.drive is None:
             continue
-        # Drives that nearly coincide stay visible: dashes of different offsets over one another.
-        colour, label, dashes = COLOURS[result.row.label], result.row.label, (7 * index, (7, 21))
+        # Drives that nearly coincide stay visible: each narrower than the one below it.
+        colour, label, width = COLOURS[result.row.label], result.row.label, 1.2 + 1.4 * (len(drives) - 1 - index)
         phi = result.drive.angle(times)
-        angle.plot(times, phi, color=colour, lw=2.2, ls=dashes)
-        speed.plot(times, result.drive.speed(times), color=colour, lw=2.2, ls=dashes)
+        angle.plot(times, phi, color=colour, lw=width)
+        speed.plot(times, result.drive.speed(times), color=colour, lw=width)
         apart.plot(times, 1e3 * radius * (phi - experiment.needed), color=colour, lw=1.4, label=label)
     angle.set(title="Optimised drum drives (positive pays out)", ylabel="drum angle φ$_H$, rad")
     speed.set(ylabel="drum speed, rad/s")
@@ -116,15 +116,14 @@ def _amplitudes(path: Path, results: Sequence[Result]) -> None:
     axes = figure.add_subplot()
     place = np.arange(len(results))
     for offset, alpha, name in ((-0.2, 1.0, "amplitude"), (0.2, 0.5, "rms")):
-        heights = [getattr(result.row, name) for result in results]
+        heights = [1e3 * getattr(result.row, name) for result in results]
         colours = [COLOURS[result.row.label] for result in results]
         bars = axes.bar(place + offset, heights, width=0.38, color=colours, alpha=alpha)
-        axes.bar_label(
-            bars, labels=[f"{1e3 * h:,.0f}" if h > 0.1 else f"{1e3 * h:.3g}" for h in heights], fontsize=9, padding=2
-        )
+        axes.bar_label(bars, labels=[f"{h:,.0f}" if h > 100.0 else f"{h:.3g}" for h in heights], fontsize=9, padding=2)
     axes.set_yscale("log")
-    axes.set_ylim(None, 4.0 * max(result.row.amplitude for result in results))
+    axes.set_ylim(None, 4e3 * max(result.row.amplitude for result in results))
+    axes.yaxis.set_major_formatter("{x:,.6g}")
     axes.set_xticks(place, [result.row.label for result in results])
-    axes.set(title="Amplitude (left) and root mean square (right) of the depth error, labelled in mm", ylabel="m")
+    axes.set(title="Depth error: amplitude (left) and root mean square (right, pale)", ylabel="mm")
     axes.grid(axis="y", alpha=0.3)
     _save(figure, path)

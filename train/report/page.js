@@ -78,6 +78,8 @@
   const DECADES = Array.from({ length: 40 }, (_, index) => index - 20);
   const BEYOND = 1e9;
   const MOST_TICKS = 14;
+  // Where profiles end, as a share of the heave that is left: a few lost loads would squeeze all the rest.
+  const FARTHEST = 10;
 
   // Figures 1, 2, 5 of every decade from low to high; where there is little room or they are many, 1 alone.
   function ticksBetween(low, high, sparse) {
@@ -169,7 +171,7 @@
       text: [x[0], ...x, x.at(-1)].map((left) => percent(1 - left)),
       hovertemplate: "%{fullData.name}: at least %{text} in %{y:.1%}<extra></extra>",
     })), {
-      xaxis: reductionAxis("heave reduction", curves.flatMap(([, { x }]) => x), narrow()),
+      xaxis: reductionAxis("heave reduction", curves.flatMap(([, { x }]) => x.filter((left) => left <= FARTHEST)), narrow()),
       yaxis: axis("share of scenarios", {
         range: [0, 1.02], tickvals: [0, 0.2, 0.4, 0.6, 0.8, 1], ticktext: [0, 0.2, 0.4, 0.6, 0.8, 1].map(short),
       }),

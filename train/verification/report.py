@@ -25,6 +25,8 @@ class Check:
     measured: str
     passed: bool
     rows: Sequence[Row] = field(default_factory=tuple)
+    note: str = ""
+    """What a reader may ask about the rows."""
 
 
 def markdown(checks: Sequence[Check], heading: str, footer: str) -> str:
@@ -38,4 +40,6 @@ def markdown(checks: Sequence[Check], heading: str, footer: str) -> str:
             lines += ["", f"## {check.name}", "", "| figure | here | reference | error |"]
             lines += ["| --- | --- | --- | --- |"]
             lines += [f"| {r.quantity} | {r.measured} | {r.reference} | {r.error} |" for r in check.rows]
+        if check.note:
+            lines += ["", check.note]
     return "\n".join([*lines, "", footer, ""])

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from numba import prange
 
 from aframe_env.crane import Frame
-from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar, source_digest
+from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar
 from aframe_env.dynamics.flexible import layout as flex
 from aframe_env.dynamics.flexible.blocks import nine
 from aframe_env.dynamics.flexible.reduction import ModalFrame, modal_frame
@@ -184,13 +184,11 @@ def largest_rotation(frame: Array, table: Array, first: int, lanes: int, j: int)
 @cache
 def readout_kernel(lanes: int, parallel: bool) -> Callable[[Array, Array, Array], None]:
     """Kernel (frames, tables, results (N, READOUTS)) that reads the rows' frames out."""
-    source: Any = source_digest()
     compile_as = parallel_kernel if parallel else kernel
     loop: Any = prange if parallel else range
 
     @compile_as
     def readout(frames: Array, tables: Array, results: Array) -> None:
-        source  # noqa: B018
         for block in loop(frames.shape[0]):
             sums = np.empty(6 * int(tables[0, SPRINGS]))
             for j in range(lanes):

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import eigh
+import scipy
 
 from aframe_env.crane import Frame
 from aframe_env.dynamics.rfem.beam import Array
@@ -70,7 +70,7 @@ def basis(model: FrameModel, modes: int | None, loads: Array) -> tuple[Array, Ar
     ``loads`` are the generalised forces (n, k) of the static shapes.
     """
     stiffness = model.reduced_stiffness
-    squares, vectors = eigh(stiffness)
+    squares, vectors = scipy.linalg.eigh(stiffness)
     if modes is None or modes + STATIC_SHAPES >= squares.size:
         return squares, vectors
     # A static shape less its share in the modes that are kept is a sum of the modes that are not.
@@ -78,7 +78,7 @@ def basis(model: FrameModel, modes: int | None, loads: Array) -> tuple[Array, Ar
     shapes = left @ ((left.T @ model.constraints.basis.T @ loads) / squares[modes:, None])
     directions, sizes, _ = np.linalg.svd(shapes / np.linalg.norm(shapes, axis=0), full_matrices=False)
     kept = np.hstack([vectors[:, :modes], directions[:, sizes > 1e-9]])
-    reduced, mixed = eigh(kept.T @ stiffness @ kept)
+    reduced, mixed = scipy.linalg.eigh(kept.T @ stiffness @ kept)
     return reduced, kept @ mixed
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from numba import prange
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar, source_digest
+from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar
 from aframe_env.dynamics.flexible import layout as flex
 from aframe_env.dynamics.flexible.blocks import nine, three
 from aframe_env.dynamics.flexible.deck import advance_deck, deck_at
@@ -163,11 +163,9 @@ class FlexibleKernels(NamedTuple):
 @cache
 def flexible_kernels(lanes: int = LANES) -> FlexibleKernels:
     """Kernels for blocks of ``lanes`` rows (LANES for a batch, 1 for a single row)."""
-    source: Any = source_digest()
 
     @kernel
     def step(blocks: Array, frames: Array, tables: Array, components: int, segments: int, records: Array) -> None:
-        source  # noqa: B018  (a changed digest makes a new cache entry)
         for block in range(blocks.shape[0]):
             control_step(blocks[block], frames[block], tables, components, segments, records, lanes)
 
@@ -175,13 +173,11 @@ def flexible_kernels(lanes: int = LANES) -> FlexibleKernels:
     def step_parallel(
         blocks: Array, frames: Array, tables: Array, components: int, segments: int, records: Array
     ) -> None:
-        source  # noqa: B018
         for block in prange(blocks.shape[0]):
             control_step(blocks[block], frames[block], tables, components, segments, records, lanes)
 
     @kernel
     def start(blocks: Array, frames: Array, tables: Array, comoving: float) -> None:
-        source  # noqa: B018
         for block in range(blocks.shape[0]):
             start_rows(blocks[block], frames[block], tables, comoving, lanes)
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
+import scipy
 
 from aframe_env.crane import Frame
 from aframe_env.dynamics.rfem.beam import Array, Member, Segment, Spring, divide
@@ -30,10 +30,10 @@ class Division:
     """n of the top beam, even (the pulley S sits on its middle rfe), in [2, 10000]."""
 
     def __post_init__(self) -> None:
-        require_integer("division.leg", self.leg, low=1, high=10_000)
-        require_integer("division.beam", self.beam, low=2, high=10_000)
+        require_integer("rfes (leg)", self.leg, low=1, high=10_000)
+        require_integer("rfes (beam)", self.beam, low=2, high=10_000)
         if self.beam % 2:
-            raise InvalidValue(f"division.beam = {self.beam}: must be even, for S to lie on the middle rfe")
+            raise InvalidValue(f"rfes (beam) = {self.beam}: must be even, for S to lie on the middle rfe")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,16 +110,16 @@ class Structure:
         """Diagonal of M_F, (n,), kg and kg m²; eq. (14)."""
         return np.concatenate([np.concatenate([np.full(3, body.mass), body.inertia]) for body in self.bodies])
 
-    def deformation(self) -> sp.csr_array:
+    def deformation(self) -> scipy.sparse.csr_array:
         """(6 n_sde, n): deformation of every sde along its member's axes (behind minus before)."""
-        matrix = sp.lil_array((6 * len(self.springs), self.size))
+        matrix = scipy.sparse.lil_array((6 * len(self.springs), self.size))
         for row, (spring, (before, behind)) in enumerate(zip(self.springs, self.spring_bodies, strict=True)):
             to_member = spring.member.axes.T
             for index, sign in ((before, -1.0), (behind, 1.0)):
                 body = self.bodies[index]
                 block = np.vstack([to_member @ body.displacement(spring.place), to_member @ body.rotation()])
                 matrix[6 * row : 6 * row + 6, 6 * index : 6 * index + 6] = sign * block
-        return sp.csr_array(matrix)
+        return scipy.sparse.csr_array(matrix)
 
     def stiffness(self) -> Array:
         """Diagonal of the sdes' stiffness, (6 n_sde,)."""

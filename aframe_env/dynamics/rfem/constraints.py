@@ -18,7 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import null_space
+import scipy
 
 from aframe_env.crane import Frame
 from aframe_env.dynamics.rfem.beam import Array
@@ -122,7 +122,7 @@ def local_basis(matrix: Array, mass: Array, coordinates: int = 6) -> Array:
     for label in sorted(set(group)):
         inside = np.repeat(np.array(group) == label, coordinates)
         own = matrix[np.abs(matrix[:, inside]).sum(axis=1) > 0.0][:, inside]
-        local = null_space(own / root[inside]) if own.size else np.eye(int(inside.sum()))
+        local = scipy.linalg.null_space(own / root[inside]) if own.size else np.eye(int(inside.sum()))
         block = np.zeros((mass.size, local.shape[1]))
         block[inside] = local / root[inside, None]
         columns.append(block)

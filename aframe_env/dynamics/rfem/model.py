@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Literal, TypeAlias
 
 import numpy as np
-import scipy.sparse as sp
+import scipy
 
 from aframe_env.crane import GRAVITY, Frame
 from aframe_env.dynamics.rfem.beam import Array
@@ -61,7 +61,7 @@ class FrameModel:
         return self.structure.mass()
 
     @cached_property
-    def deformation(self) -> sp.csr_array:
+    def deformation(self) -> scipy.sparse.csr_array:
         """(6 n_sde, n): deformations of the sdes."""
         return self.structure.deformation()
 
@@ -78,7 +78,7 @@ class FrameModel:
 
     def _assembled(self, diagonal: Array, servomotor: float) -> Array:
         spread = self.deformation
-        total = (spread.T @ sp.diags_array(diagonal) @ spread).toarray()
+        total = (spread.T @ scipy.sparse.diags_array(diagonal) @ spread).toarray()
         rows = self.servomotors
         return np.asarray(total + servomotor * rows.T @ rows, dtype=np.float64)
 
@@ -118,8 +118,8 @@ class FrameModel:
         return self._reduced(self.damping)
 
     def _reduced(self, matrix: Array) -> Array:
-        basis = sp.csr_array(self.constraints.basis)
-        reduced = (basis.T @ sp.csr_array(matrix) @ basis).toarray()
+        basis = scipy.sparse.csr_array(self.constraints.basis)
+        reduced = (basis.T @ scipy.sparse.csr_array(matrix) @ basis).toarray()
         return np.asarray(0.5 * (reduced + reduced.T), dtype=np.float64)
 
     @property

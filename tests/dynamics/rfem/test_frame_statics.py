@@ -136,8 +136,8 @@ def test_large_rotation_warns_with_the_figure():
         (lambda: LoadCase(rope_tension=-1.0), "rope_tension.*N"),
         (lambda: LoadCase(forces={"X": (0, 0, 1)}), "forces.*'N_R'"),
         (lambda: LoadCase(forces={"S": (0, 0)}), "forces.S"),
-        (lambda: Division(leg=10, beam=7), "even"),
-        (lambda: Division(leg=0, beam=8), "division.leg"),
+        (lambda: Division(leg=10, beam=7), r"rfes \(beam\) = 7: must be even"),
+        (lambda: Division(leg=0, beam=8), r"rfes \(leg\) = 0"),
     ],
 )
 def test_bad_input_is_named(build, words):

@@ -1,0 +1,103 @@
+"""Samples of a run: their median and spread, kept in a file from round to round."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import statistics
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+from aframe_env.structuring import strict_converter, structure
+from aframe_env.validation import InvalidValue
+from train.output import versions, write_json
+
+NOT_ASKED: Final = "not measured in this run"
+
+
+@dataclass
+class Series:
+    """Samples of one measure, one a round; or why there are none."""
+
+    samples: list[float] = field(default_factory=list)
+    error: str = ""
+
+    @property
+    def measured(self) -> bool:
+        """Whether there are samples, and none of them failed."""
+        return bool(self.samples) and not self.error
+
+    @property
+    def median(self) -> float:
+        """Median of the samples."""
+        return statistics.median(self.samples)
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What was measured on."""
+
+    processor: str
+    cores: int
+    """Cores that the run may use; it uses at most two."""
+    pinned: bool
+    system: str
+    compiler: str
+
+    @classmethod
+    def here(cls, compiler: str) -> Machine:
+        """This machine."""
+        pinned = hasattr(os, "sched_getaffinity")
+        cores = len(os.sched_getaffinity(0)) if pinned else os.cpu_count() or 1
+        return cls(_processor(), cores, pinned, f"{platform.system()} {platform.machine()}", compiler)
+
+
+def _processor() -> str:
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        for line in info.read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or "unknown"
+
+
+@dataclass
+class Run:
+    """A run, finished or not."""
+
+    command: str
+    rounds: int
+    machine: Machine
+    versions: dict[str, str]
+    series: dict[str, Series]
+    """By key of the measure."""
+    peer_versions: dict[str, dict[str, str]] = field(default_factory=dict)
+    """By script."""
+
+    @classmethod
+    def new(cls, command: str, rounds: int, machine: Machine) -> Run:
+        """A run without samples."""
+        return cls(command, rounds, machine, versions(), {})
+
+    def get(self, key: str) -> Series:
+        """Series of a measure; an empty one if it was not asked for."""
+        return self.series.get(key, Series(error=NOT_ASKED))
+
+    def data(self) -> dict[str, Any]:
+        """As plain data."""
+        return dict(strict_converter().unstructure(self))
+
+    def save(self, path: Path) -> None:
+        """Write the samples, all or nothing."""
+        write_json(path, self.data())
+
+    @classmethod
+    def load(cls, path: Path) -> Run:
+        """Read what ``save`` wrote."""
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+        except json.JSONDecodeError as error:
+            raise InvalidValue(f"{path}: not JSON: {error}") from error
+        return structure(strict_converter(), data, cls, str(path))
