@@ -28,10 +28,8 @@ SPECTRA: tuple[str, ...] = ("jonswap", "pierson-moskowitz")
 
 FULL_TURN = 2.0 * math.pi
 """rad."""
-LEAST_GAMMA: Final = 1.0
-GAMMA_STEP: Final = 0.1
-"""Quantiles of frequency are tabulated for peak enhancement factors so far apart."""
-_GAMMAS = np.linspace(LEAST_GAMMA, 10.0, 91)
+_GAMMA_STEP: Final = 0.1
+_GAMMAS = np.linspace(1.0, 10.0, 91)
 _QUANTILES = 2049
 
 
@@ -41,6 +39,16 @@ def dnv_gamma(hs: float, tp: float) -> float:
     if ratio <= 3.6:
         return 5.0
     return max(1.0, math.exp(5.75 - 1.15 * ratio))
+
+
+def gamma_place(gamma: float) -> float:
+    """Place of a peak enhancement factor in ``frequency_quantiles``, in lines."""
+    return (gamma - 1.0) / _GAMMA_STEP
+
+
+def amplitude_of_each(hs: float, components: int) -> float:
+    """Amplitude [m] of each of so many waves of equal energy that make up a sea of significant wave height hs [m]."""
+    return hs * math.sqrt(2.0 / components) / 4.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,11 +103,11 @@ class Sea:
             self.components,
             2.0 * math.pi / self.tp,
             frequency_quantiles(),
-            (self.peak_enhancement - LEAST_GAMMA) / GAMMA_STEP,
+            gamma_place(self.peak_enhancement),
             self.heading,
             direction_quantiles(self.spreading),
         )
-        amplitude = np.full(self.components, self.hs * math.sqrt(2.0 / self.components) / 4.0)
+        amplitude = np.full(self.components, amplitude_of_each(self.hs, self.components))
         return Waves(frequency, direction, amplitude, phase)
 
 

@@ -11,7 +11,8 @@ from gymnasium.error import DependencyNotInstalled
 
 from aframe_env import task
 from aframe_env.motion import require_coverage
-from aframe_env.scenario import SUBSTREAM, Scenario, ScenarioSource
+from aframe_env.random import episode_uniforms
+from aframe_env.scenario import NUMBERS, Scenario, ScenarioSource
 from aframe_env.simulation import Simulation
 from aframe_env.validation import InvalidValue, require_integer
 
@@ -209,13 +210,11 @@ class ProcessorRows:
         return torch.from_numpy(simulation.observe()), results[:, task.COST], results[:, task.PARTED] > 0.0
 
     def _draw(self, row: int) -> Scenario:
-        from aframe_env.cuda.drawing import uniforms
-
         source = self._simulation.source
         if isinstance(source, Scenario):
             return source
-        numbers = np.empty(3 * SUBSTREAM)
-        uniforms(self._seed, row, int(self._episodes[row]), numbers)
+        numbers = np.empty(NUMBERS)
+        episode_uniforms(self._seed, row, int(self._episodes[row]), numbers)
         return source.at(numbers)
 
 

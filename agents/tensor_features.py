@@ -12,7 +12,6 @@ from aframe_env.task import STATE
 from agents.control.winch import WinchModel
 from agents.features import AUTHORITY, LIMIT, STATE_FEATURES
 
-
 _Find = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 """(wanted turns, drum speeds), both (N,) float64 → commands (N,)."""
 

@@ -1,6 +1,6 @@
-"""Scenarios drawn in compiled code: what ``ScenarioDistribution`` and ``Engine`` do for a row, without either.
+"""Scenarios drawn on the device: what ``ScenarioDistribution`` and ``Engine.row_vector`` do for a row on the processor.
 
-The random numbers are addressed by seed, row and episode, so that a row's scenarios depend on nothing else.
+Both take the same steps, with the same functions, from the same random numbers (``aframe_env.random``).
 """
 
 from __future__ import annotations
@@ -14,25 +14,33 @@ import numpy.typing as npt
 from aframe_env import sea
 from aframe_env.crane import GRAVITY
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.compiling import kernel, scalar
+from aframe_env.dynamics import start
+from aframe_env.dynamics.compiling import scalar
 from aframe_env.dynamics.knots import bend_bound, segments_between_knots, set_turning
 from aframe_env.dynamics.layout import Span
 from aframe_env.dynamics.step import start_rows
 from aframe_env.dynamics.waves import draw_wave, respond, response_cell
-from aframe_env.engine import INNER_STEP_PHASE, MAX_INNER_STEP
-from aframe_env.random import uniform
+from aframe_env.random import draw_seed, uniform
 from aframe_env.scenario import SUBSTREAM, Range, ScenarioDistribution
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
-UNIFORMS: Final = 3 * SUBSTREAM
-"""Random numbers of one scenario."""
-
+_critical_damping = scalar(start.critical_damping)
+_free_length = scalar(start.free_length)
+_hang_load = scalar(start.hang_load)
+_inner_steps = scalar(start.inner_steps)
+_longest_inner_step = scalar(start.longest_inner_step)
+_write_lift = scalar(start.write_lift)
+_amplitude_of_each = scalar(sea.amplitude_of_each)
 _dnv_gamma = scalar(sea.dnv_gamma)
+_gamma_place = scalar(sea.gamma_place)
 
-# Lines of ``Tables.ranges``.
+# Lines of ``Tables.ranges``, and entries of ``Tables.limits``.
 _HS, _TP, _HEADING, _GAMMA, _LOAD_MASS, _ROPE_LENGTH, _DAMPING_RATIO = range(7)
+_INNER_STEP, _RAMP, _LEAST_LENGTH, _MOST_LENGTH = range(4)
+_LOAD: Final = SUBSTREAM
+_ROPE: Final = 2 * SUBSTREAM
 
 
 class Tables(NamedTuple):
@@ -46,7 +54,9 @@ class Tables(NamedTuple):
     limits: FloatArray
     """(4,) greatest inner step (0: as the load's bobbing asks for), ramp [s], least and greatest rope length [m]."""
     frequency_quantiles: FloatArray
+    """See ``sea.frequency_quantiles``."""
     direction_quantiles: FloatArray
+    """See ``sea.direction_quantiles``."""
     frequencies: FloatArray
     """(F,) rad/s, of the vessel's table."""
     headings: FloatArray
@@ -75,20 +85,6 @@ def tables_of(distribution: ScenarioDistribution, row: FloatArray, max_inner_ste
 
 
 @scalar
-def row_seed(seed: int, row: int) -> int:
-    """Seed of a row's scenarios."""
-    return int(uniform(seed, row) * 9007199254740992.0)
-
-
-@kernel
-def uniforms(seed: int, row: int, episode: int, numbers: FloatArray) -> None:
-    """Random numbers (UNIFORMS,) that ``draw_row`` draws a scenario with."""
-    own = row_seed(seed, row)
-    for k in range(UNIFORMS):
-        numbers[k] = uniform(own, UNIFORMS * episode + k)
-
-
-@scalar
 def drawn(ranges: FloatArray, line: int, probability: float) -> float:
     """A number of the interval in a line of ``Tables.ranges``."""
     return ranges[line, 0] + (ranges[line, 1] - ranges[line, 0]) * probability
@@ -96,27 +92,26 @@ def drawn(ranges: FloatArray, line: int, probability: float) -> float:
 
 @scalar
 def draw_lift(row: FloatArray, lanes: int, j: int, seed: int, first: int, ranges: Any, limits: Any) -> None:
-    """Draw lane j's load and rope with the uniform numbers from ``first`` on."""
-    mass = drawn(ranges, _LOAD_MASS, uniform(seed, first + SUBSTREAM))
-    rope_length = drawn(ranges, _ROPE_LENGTH, uniform(seed, first + 2 * SUBSTREAM))
-    ratio = drawn(ranges, _DAMPING_RATIO, uniform(seed, first + 2 * SUBSTREAM + 1))
-    axial_stiffness, radius = row[at.AXIAL_STIFFNESS * lanes + j], row[at.DRUM_RADIUS * lanes + j]
-    free_length = (rope_length + row[at.DRUM_TO_PULLEY * lanes + j]) / (1.0 + mass * GRAVITY / axial_stiffness)
-    stiffness = axial_stiffness / free_length
-    segment, lag = row[at.CONTROL_PERIOD * lanes + j], row[at.LAG * lanes + j]
-    longest = limits[0]
-    if longest == 0.0:
-        longest = min(MAX_INNER_STEP, INNER_STEP_PHASE / math.sqrt(stiffness / mass))
-    substeps = max(1.0, math.ceil(segment / longest - 1e-9))
-    row[at.MASS * lanes + j] = mass
-    row[at.TARGET * lanes + j] = row[(at.PULLEY_ON_DECK + 2) * lanes + j] - rope_length
-    row[at.ROPE_DAMPING * lanes + j] = ratio * 2.0 * math.sqrt(stiffness * mass)
-    row[at.FREE_LENGTH * lanes + j] = free_length
-    row[at.MIN_ANGLE * lanes + j] = (limits[2] - free_length) / radius
-    row[at.MAX_ANGLE * lanes + j] = (limits[3] - free_length) / radius
-    row[at.SUBSTEPS * lanes + j] = substeps
-    row[at.INNER_STEP * lanes + j] = segment / substeps
-    row[at.HALF_STEP_DECAY * lanes + j] = math.exp(-0.5 * segment / substeps / lag) if lag > 0.0 else 0.0
+    """Draw lane j's load and rope with the uniform numbers of ``seed`` from ``first`` on."""
+    mass = drawn(ranges, _LOAD_MASS, uniform(seed, first + _LOAD))
+    rope_length = drawn(ranges, _ROPE_LENGTH, uniform(seed, first + _ROPE))
+    ratio = drawn(ranges, _DAMPING_RATIO, uniform(seed, first + _ROPE + 1))
+    axial_stiffness = row[at.AXIAL_STIFFNESS * lanes + j]
+    length = _free_length(rope_length, row[at.DRUM_TO_PULLEY * lanes + j], mass * GRAVITY, axial_stiffness)
+    stiffness = axial_stiffness / length
+    longest = limits[_INNER_STEP] if limits[_INNER_STEP] > 0.0 else _longest_inner_step(math.sqrt(stiffness / mass))
+    _write_lift(
+        row,
+        lanes,
+        j,
+        mass,
+        row[(at.PULLEY_ON_DECK + 2) * lanes + j] - rope_length,
+        ratio * _critical_damping(stiffness, mass),
+        length,
+        limits[_LEAST_LENGTH],
+        limits[_MOST_LENGTH],
+        _inner_steps(row[at.CONTROL_PERIOD * lanes + j], longest),
+    )
 
 
 @scalar
@@ -135,16 +130,14 @@ def draw_motion(
     headings: Any,
     response: Any,
 ) -> None:
-    """Draw lane j's sea of ``components`` waves with the uniform numbers from ``first`` on, and write the deck's motion."""
+    """Draw a sea of ``components`` waves with the uniform numbers of ``seed`` from ``first`` on: lane j's motion."""
     hs = drawn(ranges, _HS, uniform(seed, first))
     tp = drawn(ranges, _TP, uniform(seed, first + 1))
     heading = drawn(ranges, _HEADING, uniform(seed, first + 2))
     gamma = drawn(ranges, _GAMMA, uniform(seed, first + 3))
-    if gamma == 0.0:
-        gamma = _dnv_gamma(hs, tp)
-    waves = int(uniform(seed, first + 4) * 9007199254740992.0)
-    place = (gamma - sea.LEAST_GAMMA) / sea.GAMMA_STEP
-    amplitude = hs * math.sqrt(2.0 / components) / 4.0
+    place = _gamma_place(gamma if gamma > 0.0 else _dnv_gamma(hs, tp))
+    waves = draw_seed(seed, first + 4)
+    amplitude = _amplitude_of_each(hs, components)
     x, y, z = (
         row[at.PULLEY_ON_DECK * lanes + j],
         row[(at.PULLEY_ON_DECK + 1) * lanes + j],
@@ -165,18 +158,18 @@ def draw_motion(
         row[(base + at.FREQUENCY) * lanes + j] = frequency
         bound += bend_bound(
             frequency,
-            component_size(row, lanes, j, base, 0),
-            component_size(row, lanes, j, base, 1),
-            component_size(row, lanes, j, base, 2),
-            component_size(row, lanes, j, base, 3),
-            component_size(row, lanes, j, base, 4),
-            component_size(row, lanes, j, base, 5),
+            modulus(row, lanes, j, base, 0),
+            modulus(row, lanes, j, base, 1),
+            modulus(row, lanes, j, base, 2),
+            modulus(row, lanes, j, base, 3),
+            modulus(row, lanes, j, base, 4),
+            modulus(row, lanes, j, base, 5),
             x,
             y,
             z,
         )
     segment = row[at.CONTROL_PERIOD * lanes + j]
-    segments = segments_between_knots(bound, segment, limits[1])
+    segments = segments_between_knots(bound, segment, limits[_RAMP])
     row[at.KNOT_SEGMENTS * lanes + j] = segments
     for k in range(components):
         frequency = row[(at.ROW_SLOTS + k * at.COMPONENT_SLOTS + at.FREQUENCY) * lanes + j]
@@ -184,8 +177,8 @@ def draw_motion(
 
 
 @scalar
-def component_size(row: FloatArray, lanes: int, j: int, base: int, dof: int) -> float:
-    """Modulus of a component's response in coordinate ``dof``."""
+def modulus(row: FloatArray, lanes: int, j: int, base: int, dof: int) -> float:
+    """Amplitude of coordinate ``dof`` in the component of lane j whose slots begin at ``base``."""
     return math.hypot(
         row[(base + at.RESPONSE + dof) * lanes + j],
         row[(base + at.RESPONSE + 6 + dof) * lanes + j],
@@ -193,17 +186,11 @@ def component_size(row: FloatArray, lanes: int, j: int, base: int, dof: int) -> 
 
 
 @scalar
-def hang_load(row: FloatArray, room: int, records: FloatArray, lanes: int, j: int) -> None:
-    """Put lane j's load under the pulley, moving along with it, and measure the rope."""
+def begin_episode(row: FloatArray, room: int, records: FloatArray, lanes: int, j: int) -> None:
+    """Pose lane j's deck, hang its load under the pulley, moving along with it, and measure the rope."""
     span = Span(lanes, j, j + 1)
     start_rows(row, room, records, span)
-    for axis in range(3):
-        row[(at.LOAD_POSITION + axis) * lanes + j] = row[(at.PULLEY + axis) * lanes + j]
-        row[(at.LOAD_VELOCITY + axis) * lanes + j] = row[(at.PULLEY + 3 + axis) * lanes + j]
-    rope_length = row[(at.PULLEY_ON_DECK + 2) * lanes + j] - row[at.TARGET * lanes + j]
-    row[(at.LOAD_POSITION + 2) * lanes + j] -= rope_length
-    error = row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j]
-    row[at.OMEGA2 * lanes + j] = abs(error)
+    _hang_load(row, lanes, j, True)
     start_rows(row, room, records, span)
 
 

@@ -8,10 +8,12 @@ from typing import Any, NamedTuple
 
 from numba import cuda
 
-from aframe_env.cuda.drawing import UNIFORMS, copy_row, draw_lift, draw_motion, hang_load, row_seed
+from aframe_env.cuda.drawing import begin_episode, copy_row, draw_lift, draw_motion
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.layout import LANES, Span
 from aframe_env.dynamics.step import control_step
+from aframe_env.random import draw_seed
+from aframe_env.scenario import NUMBERS
 from aframe_env.task import charge_parted, clip_row, read_out
 
 Array = Any
@@ -86,7 +88,7 @@ def draw(
     i, j = cuda.grid(1), cuda.threadIdx.x
     if i < finished.shape[0] and finished[i] != 0:
         row = blocks[cuda.blockIdx.x]
-        own, first = row_seed(seed, i), UNIFORMS * episodes[i]
+        own, first = draw_seed(seed, i), NUMBERS * episodes[i]
         episodes[i] += 1
         copy_row(row, LANES, j, vector)
         draw_lift(row, LANES, j, own, first, ranges, limits)
@@ -105,7 +107,7 @@ def draw(
             headings,
             response,
         )
-        hang_load(row, room, records, LANES, j)
+        begin_episode(row, room, records, LANES, j)
         read_out(row, LANES, j, state, results, i)
         clip_row(state, low, high, observation, i)
 

@@ -1,4 +1,4 @@
-"""One wave of a random sea, and how the deck answers it: scalar, for whatever draws seas, one or a million at a time."""
+"""One wave of a random sea, and how the deck answers it."""
 
 from __future__ import annotations
 
