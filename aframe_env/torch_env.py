@@ -50,7 +50,10 @@ class Rows(Protocol):
         ...
 
     def advance(self, actions: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Advance by one control step: observation (N, 14), cost (N,) m² s, whose ropes have parted (N,)."""
+        """Advance by one control step: observation (N, 14), cost (N,) m² s, whose ropes have parted (N,).
+
+        The cost is the rows' own memory, which the next call changes.
+        """
         ...
 
 
@@ -148,13 +151,14 @@ class AFrameHeaveTorchEnv:
         self._require("actions", actions, (self.num_envs, 1), None)
         actions = actions.detach().to(torch.float32).contiguous()
         final, cost, parted = self._rows.advance(actions)
+        rewards = -cost.to(torch.float32)
         self.episode_length_buf += 1
         time_outs = (self.episode_length_buf >= self.max_episode_length) & ~parted
         dones = parted | time_outs
         self._observation = self._rows.restart(dones, final)
         self.episode_length_buf.masked_fill_(dones, 0)
         extras = {"time_outs": time_outs, "final_obs": final}
-        return self.get_observations(), -cost.to(torch.float32), dones, extras
+        return self.get_observations(), rewards, dones, extras
 
     def close(self) -> None:
         """Nothing to close."""

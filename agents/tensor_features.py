@@ -10,14 +10,14 @@ import torch
 from aframe_env.crane import GRAVITY, Crane
 from aframe_env.task import STATE
 from agents.control.winch import WinchModel
-from agents.features import AUTHORITY, LIMIT, STATE_FEATURES
+from agents.features import LIMIT, STATE_FEATURES, coming_rise, of_the_state, wanted_turn
 
 _Find = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 """(wanted turns, drum speeds), both (N,) float64 → commands (N,)."""
 
 
 class TensorStateFeatures:
-    """``StateFeatures`` of rows that all have one crane; a test holds the two together."""
+    """``StateFeatures`` of N rows that all have one crane. It has no memory: every call stands for itself."""
 
     names = STATE_FEATURES
 
@@ -39,28 +39,20 @@ class TensorStateFeatures:
         radius, axial_stiffness = self._crane.winch.drum_radius, self._crane.rope.axial_stiffness
         mass, length = o["load_mass"], o["rope_length"]
         first_length = length - radius * o["drum_angle"]
-        features = (
-            4.0 * torch.tanh(0.5 * o["depth_error"]),
-            2.0 * torch.tanh(10.0 * o["depth_error"]),
-            5.0 * o["load_velocity_z"],
-            20.0 * (o["rope_tension"] - mass * GRAVITY) * length / axial_stiffness,
-            10.0 * (o["pulley_velocity_z"] - radius * o["drum_speed"]),
-            o["pulley_velocity_z"],
-            o["pulley_acceleration_z"],
-            0.5 * o["pulley_heave"],
-            mass / 5.0e4 - 1.2,
-            length / 1.0e3 - 0.8,
-            0.25 * torch.sqrt(axial_stiffness / (first_length * mass)) - 1.0,
+        features = of_the_state(
+            torch,
+            o,
+            radius,
+            stretch=(o["rope_tension"] - mass * GRAVITY) * length / axial_stiffness,
+            frequency=torch.sqrt(axial_stiffness / (first_length * mass)),
         )
-        return torch.clamp(torch.stack(features, dim=1), -LIMIT, LIMIT).to(torch.float32)
+        return torch.clip(torch.stack(features, dim=1), -LIMIT, LIMIT).to(torch.float32)
 
     def command(self, observation: torch.Tensor, output: torch.Tensor) -> torch.Tensor:
         """Drum speed commands (N, 1) rad/s for a network's output (N, 1), in [-1, 1], to observations (N, K)."""
-        o = _columns(observation)
-        winch, period = self._crane.winch, self._period
-        rise = period * (o["pulley_velocity_z"] + 0.5 * period * o["pulley_acceleration_z"])
-        up = AUTHORITY * winch.max_acceleration * winch.drum_radius * torch.clamp(output[:, 0].double(), -1.0, 1.0)
-        turn = (rise - period * up) / winch.drum_radius
+        o, winch = _columns(observation), self._crane.winch
+        rise = coming_rise(o, self._period)
+        turn = wanted_turn(torch, rise, output[:, 0].double(), winch.drum_radius, winch.max_acceleration, self._period)
         return self._find(turn, o["drum_speed"])[:, None].to(torch.float32)
 
 

@@ -26,6 +26,15 @@ from agents.features import LIMIT, STATE_FEATURES, StateFeatures, features_for
 Float32Array = npt.NDArray[np.float32]
 
 
+def shaped(xp: Any, mean_square: Any, scale: float, knee: float) -> Any:
+    """Rewards (N,) for mean squares of the depth error (N,) m², arrays of ``xp`` = numpy or torch.
+
+    ``scale``: of a metre of root mean square; ``knee`` [m]: beyond it the reward falls with the logarithm only.
+    """
+    rms = xp.sqrt(xp.clip(mean_square, None, 1e4))
+    return -scale * (knee * xp.log1p(rms / knee) if math.isfinite(knee) else rms)
+
+
 class TrainingVecEnv(VecEnv):
     """Rows of the task for a learner: SAME_STEP resets, infos only for the rows that finished."""
 
@@ -110,10 +119,7 @@ class TrainingVecEnv(VecEnv):
         cost = simulation.results[:, task.COST]
         self._error_sum += float(cost.sum())
         self._still_sum += float(np.square(simulation.state[:, 6]).sum()) * simulation.control_period
-        rms = np.sqrt(np.minimum(cost / simulation.control_period, 1e4))
-        if math.isfinite(self._reward_knee):
-            rms = self._reward_knee * np.log1p(rms / self._reward_knee)
-        rewards = -self._reward_scale * rms
+        rewards = shaped(np, cost / simulation.control_period, self._reward_scale, self._reward_knee)
         self._return += rewards
         self._length += 1
         self._left -= 1

@@ -1,6 +1,7 @@
 """PPO from rsl_rl on rows that live on the GPU, and what it learns from: ``python -m train.ppo --device cuda``.
 
-Environment, features, rewards and learner stay on the device. The same runs on the processor (``python -m train.gpu_ppo --device cpu``), to be tried where there is no GPU.
+Environment, features, rewards and learner stay on the device. ``python -m train.gpu_ppo --device cpu`` runs the same on
+the processor, to be tried where there is no GPU.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from agents.network import Actor
 from agents.tensor_features import TensorStateFeatures
 from train import ppo
 from train.actor_critic import ActorLatent, CriticLatent, actor_of
+from train.bridge import shaped
 from train.config import parse
 from train.learning import Learner, train
 from train.output import user_errors
@@ -112,13 +114,11 @@ class TrainingRows:
         final, cost = extras["final_obs"], -rewards.double()
         self._errors += cost.sum()
         self._still += final[:, _PULLEY_HEAVE].double().square().sum() * self._period
-        rms = torch.sqrt(torch.clamp(cost / self._period, max=1e4))
-        if math.isfinite(self._reward_knee):
-            rms = self._reward_knee * torch.log1p(rms / self._reward_knee)
+        rewards = shaped(torch, cost / self._period, self._reward_scale, self._reward_knee).float()
         drifted = (final[:, 0].abs() > self._drift_limit) & ~dones
         self._env.reset(drifted)
         extras = {"time_outs": extras["time_outs"] | drifted}
-        return self.get_observations(), (-self._reward_scale * rms).float(), dones | drifted, extras
+        return self.get_observations(), rewards, dones | drifted, extras
 
     def take_reduction(self) -> float:
         """Heave reduction over all steps since the last call, exploration included."""
@@ -128,7 +128,7 @@ class TrainingRows:
         return 1.0 - math.sqrt(errors / still) if still else 0.0
 
 
-class TwoPathModel(MLPModel):
+class TwoPathModel(MLPModel):  # type: ignore[misc]
     """rsl_rl's model with a latent of ours and a linear layer for its network."""
 
     def __init__(
@@ -225,8 +225,7 @@ class RslPPO:
 
     def to_actor(self) -> Actor:
         """Return the mean action as a plain network of its own, on the processor."""
-        head = {name: tensor.cpu() for name, tensor in self._head.state_dict().items()}
-        return actor_of(self._latent.cpu(), head, squashed=False)
+        return actor_of(self._latent, self._head.state_dict(), squashed=False)
 
     def _set_rate(self, rate: float) -> None:
         self._learner.learning_rate = rate

@@ -7,7 +7,7 @@ from typing import Any
 
 import torch
 from gymnasium.error import DependencyNotInstalled
-from numba import config
+from numba.core import config
 
 from aframe_env.validation import InvalidValue
 
@@ -24,8 +24,6 @@ def open_device(name: str) -> torch.device:
         DependencyNotInstalled: numba-cuda is missing.
         InvalidValue: There is no such device.
     """
-    if find_spec("numba_cuda") is None:
-        raise DependencyNotInstalled('numba-cuda is not installed: pip install "aframe-heave[cuda]"')
     if simulated():
         if not config.DISABLE_JIT:
             raise InvalidValue("NUMBA_ENABLE_CUDASIM = 1: set NUMBA_DISABLE_JIT = 1, too")
@@ -37,6 +35,8 @@ def open_device(name: str) -> torch.device:
             f"device = {name!r}: no CUDA device: PyTorch {torch.__version__} {built} and sees none; "
             "device = 'cpu' runs the same environment on the processor"
         )
+    if find_spec("numba_cuda") is None:
+        raise DependencyNotInstalled('numba-cuda is not installed: pip install "aframe-heave[cuda]"')
     index = torch.device(name).index
     index = torch.cuda.current_device() if index is None else index
     if index >= count:

@@ -85,9 +85,10 @@ def tables_of(distribution: ScenarioDistribution, row: FloatArray, max_inner_ste
 
 
 @scalar
-def drawn(ranges: FloatArray, line: int, probability: float) -> float:
+def drawn(ranges: Any, line: int, probability: float) -> float:
     """A number of the interval in a line of ``Tables.ranges``."""
-    return ranges[line, 0] + (ranges[line, 1] - ranges[line, 0]) * probability
+    value: float = ranges[line, 0] + (ranges[line, 1] - ranges[line, 0]) * probability
+    return value
 
 
 @scalar

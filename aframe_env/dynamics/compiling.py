@@ -13,8 +13,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from numba import config, njit, types
-from numba.core import event
+from numba import njit, types
+from numba.core import config, event
 from numba.extending import intrinsic
 
 _LOGGER = logging.getLogger("aframe_env")

@@ -20,7 +20,8 @@ def quantile(table: FloatArray, probability: float) -> float:
     place = probability * (table.shape[0] - 1)
     low = min(int(place), table.shape[0] - 2)
     weight = place - low
-    return (1.0 - weight) * table[low] + weight * table[low + 1]
+    value: float = (1.0 - weight) * table[low] + weight * table[low + 1]
+    return value
 
 
 @scalar
@@ -75,6 +76,6 @@ def response_cell(
 @scalar
 def respond(table: ComplexArray, i: int, u: float, j: int, v: float, dof: int) -> complex:
     """Response of the deck's coordinate ``dof`` to a wave of amplitude 1: bilinear in cell (i, j)."""
-    low = (1.0 - v) * table[i, j, dof] + v * table[i, j + 1, dof]
-    high = (1.0 - v) * table[i + 1, j, dof] + v * table[i + 1, j + 1, dof]
+    low: complex = (1.0 - v) * table[i, j, dof] + v * table[i, j + 1, dof]
+    high: complex = (1.0 - v) * table[i + 1, j, dof] + v * table[i + 1, j + 1, dof]
     return (1.0 - u) * low + u * high
