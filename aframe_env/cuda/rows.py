@@ -56,12 +56,6 @@ class CudaRows:
     def _constant(self, array: npt.NDArray[Any]) -> Any:
         return view(torch.from_numpy(np.ascontiguousarray(array)).to(self.device))
 
-    @property
-    def bytes_a_row(self) -> int:
-        """Memory of the device that a row takes."""
-        slots = at.slots(self._room)
-        return 8 * (slots + len(task.STATE) + task.RESULTS + 1)
-
     def seed(self, seed: int) -> None:
         """Let the rows' scenarios start from a seed anew, at the next restart."""
         self._seed = seed

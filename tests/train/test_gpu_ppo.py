@@ -109,7 +109,7 @@ def test_the_agent_is_the_learner_s_mean_action() -> None:
 
 
 def test_it_learns() -> None:
-    """Some ten thousand steps in one regular sort of sea are enough to be better than at the start."""
+    """Some ten thousand steps are enough to be better than at the start."""
     options = Options(
         device="cpu", n_envs=128, n_steps=16, batch_size=512, n_epochs=5, timesteps=40_000, learning_rate=3e-3
     )
