@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from importlib.util import find_spec
 from typing import Any
 
@@ -30,9 +31,9 @@ def open_device(name: str) -> torch.device:
         return torch.device("cpu")
     count = torch.cuda.device_count()
     if not count:
-        built = f"is built for CUDA {torch.version.cuda}" if torch.version.cuda else "is built without CUDA"
+        reason = f"sees none (CUDA {torch.version.cuda})" if torch.version.cuda else "is built without CUDA"
         raise InvalidValue(
-            f"device = {name!r}: no CUDA device: PyTorch {torch.__version__} {built} and sees none; "
+            f"device = {name!r}: no CUDA device: PyTorch {torch.__version__} {reason}; "
             "device = 'cpu' runs the same environment on the processor"
         )
     if find_spec("numba_cuda") is None:
@@ -45,6 +46,8 @@ def open_device(name: str) -> torch.device:
 
     if not cuda.is_available():
         raise InvalidValue(f"device = {name!r}: PyTorch sees it, numba-cuda does not: {cuda.cuda_error()}")
+    # Of every launch with fewer than 128 blocks; few rows are no mistake.
+    warnings.filterwarnings("ignore", message="Grid size")
     device = torch.device("cuda", index)
     torch.zeros(1, device=device)  # torch makes the device's context, numba joins it
     cuda.select_device(index)
