@@ -23,7 +23,6 @@ from stable_baselines3.common.logger import Logger
 from tensordict import TensorDict
 from torch import nn
 
-from aframe_env import task
 from aframe_env.cuda.device import open_device
 from aframe_env.scenario import ScenarioDistribution
 from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
@@ -32,13 +31,12 @@ from agents.network import Actor
 from agents.tensor_features import TensorStateFeatures
 from train import ppo
 from train.actor_critic import ActorLatent, CriticLatent, actor_of
-from train.bridge import shaped
 from train.config import parse
 from train.learning import Learner, train
 from train.output import user_errors
+from train.tensor_bridge import TrainingRows
 
 _GROUPS: Final = {"actor": [GROUP], "critic": [GROUP]}
-_PULLEY_HEAVE: Final = [quantity.name for quantity in task.STATE].index("pulley_heave")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,71 +59,6 @@ class Options(ppo.Options):
         if self.observation != "state":
             raise InvalidValue(f"observation = {self.observation!r}: must be 'state' with rows on a GPU")
         require_integer("batch_size", self.batch_size, low=2, high=self.n_steps * self.n_envs)
-
-
-class TrainingRows:
-    """Rows of the task for rsl_rl's learners: what ``TrainingVecEnv`` is for those of Stable-Baselines3."""
-
-    num_actions = 1
-
-    def __init__(
-        self,
-        env: AFrameHeaveTorchEnv,
-        features: TensorStateFeatures,
-        *,
-        drift_limit: float,
-        reward_scale: float,
-        reward_knee: float,
-    ) -> None:
-        """The rows begin at random times of their episode, so that they do not all end at once."""
-        self._env, self._features = env, features
-        self._drift_limit, self._reward_scale, self._reward_knee = drift_limit, reward_scale, reward_knee
-        self.num_envs, self.device, self.cfg = env.num_envs, env.device, env.cfg
-        self.max_episode_length = env.max_episode_length
-        self.quantities: tuple[task.Quantity, ...] = task.STATE
-        self._period = env.cfg.control_period
-        self._errors, self._still = torch.zeros((2, 1), dtype=torch.float64, device=self.device)
-        self.reset()
-
-    @property
-    def episode_length_buf(self) -> torch.Tensor:
-        """(N,) control steps since each row's start."""
-        return self._env.episode_length_buf
-
-    @episode_length_buf.setter
-    def episode_length_buf(self, steps: torch.Tensor) -> None:
-        self._env.episode_length_buf = steps
-
-    def reset(self) -> TensorDict:
-        """Start all rows at random times of their episode."""
-        self._env.reset()
-        self.episode_length_buf = torch.randint_like(self.episode_length_buf, high=self.max_episode_length)
-        return self.get_observations()
-
-    def get_observations(self) -> TensorDict:
-        """Return the present features, (N, F)."""
-        features = self._features.look(self._env.get_observations()[GROUP])
-        return TensorDict({GROUP: features}, batch_size=[self.num_envs], device=self.device)
-
-    def step(self, actions: torch.Tensor) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, torch.Tensor]]:
-        """Advance with a network's outputs ``actions`` (N, 1); a row whose load has drifted far off starts anew."""
-        commands = self._features.command(self._env.get_observations()[GROUP], actions)
-        _, rewards, dones, extras = self._env.step(commands)
-        final, cost = extras["final_obs"], -rewards.double()
-        self._errors += cost.sum()
-        self._still += final[:, _PULLEY_HEAVE].double().square().sum() * self._period
-        rewards = shaped(torch, cost / self._period, self._reward_scale, self._reward_knee).float()
-        drifted = (final[:, 0].abs() > self._drift_limit) & ~dones
-        self._env.reset(drifted)
-        extras = {"time_outs": extras["time_outs"] | drifted}
-        return self.get_observations(), rewards, dones | drifted, extras
-
-    def take_reduction(self) -> float:
-        """Heave reduction over all steps since the last call, exploration included."""
-        errors, still = self._errors.item(), self._still.item()
-        self._errors.zero_()
-        self._still.zero_()
-        return 1.0 - math.sqrt(errors / still) if still else 0.0
 
 
 class TwoPathModel(MLPModel):  # type: ignore[misc]

@@ -18,7 +18,8 @@ from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
 from agents.learned import load
 from agents.tensor_features import TensorStateFeatures
 from train import gpu_ppo, ppo
-from train.gpu_ppo import Options, TrainingRows
+from train.gpu_ppo import Options
+from train.tensor_bridge import TrainingRows
 
 TINY = ("--timesteps", 512, "--n-envs", 16, "--n-steps", 8, "--batch-size", 64, "--n-epochs", 2, "--eval-scenarios", 0)
 
