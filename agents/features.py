@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.crane import GRAVITY, Crane
+from aframe_env.crane import Crane
 from aframe_env.sensors import Sensors
 from aframe_env.task import SENSED, STATE, Quantity
 from aframe_env.validation import InvalidValue
+from agents.control.observer import KalmanObserver
 from agents.control.regulator import Columns, Lifts, Observation
 from agents.estimation import ALL, HEAVE_MEMORY, FadingPolynomial, FloatArray, Rows
-from agents.kalman import RopeFilter, WaveBank, WaveFilter
 
 Float32Array = npt.NDArray[np.float32]
 
@@ -95,81 +95,50 @@ class SensedFeatures:
     names = SENSED_FEATURES
 
     def __init__(self, rows: int, control_period: float, sensors: Sensors) -> None:
-        self._period, self._sensors = control_period, sensors
-        self._delay = control_period * round(sensors.delay / control_period)
         self._lifts = Lifts(rows, control_period, SENSED)
-        self._model = self._lifts.model(_DAMPING_RATIO)
-        self._waves = WaveFilter(rows, control_period, max(1, round(sensors.depth_error.period / control_period)))
-        self._rope = RopeFilter(rows, WaveBank().rate_noise)
+        self._observer = KalmanObserver(self._lifts, _DAMPING_RATIO, sensors)
         self._pulley = FadingPolynomial(rows, HEAVE_MEMORY, control_period)
-        self._turns = np.zeros((round(sensors.delay / control_period), rows))
-        """(steps of delay, N) how far the drums have turned since the moment that the readings speak of, rad."""
-        self._heave_rate, self._drum_angle, self._first_angle, self._depth_error = np.zeros((4, rows))
+        self._ahead = control_period * round(sensors.delay / control_period) + 0.5 * control_period
+        """From the moment that the readings speak of to the middle of the coming control step, s."""
+        self._turned = np.zeros(rows)
+        """How far the drums turn in this control step, rad."""
         self._rise = np.zeros(rows)
         """Of the pulley during the coming control step, (N,) m."""
 
     def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
         """Features (n, F) of the first observations (n, K) of these ``rows``, whose past is forgotten."""
         o = self._lifts.start(cranes, observation, rows)
-        model = self._lifts.model(_DAMPING_RATIO, rows)
-        tension = self._sensors.tension
-        noise = np.maximum(tension.noise, tension.relative_noise * o["load_mass"] * GRAVITY)
-        self._model.replace(rows, model)
-        self._rope.start(model, self._period, self._lifts.stretch_under(noise, o, rows), rows)
-        self._waves.start(rows)
+        self._observer.start(o, rows)
         self._pulley.start(o["pulley_velocity_z"], rows)
-        self._turns[:, rows] = 0.0
-        self._heave_rate[rows], self._drum_angle[rows] = o["pulley_velocity_z"], o["drum_angle"]
-        self._first_angle[rows], self._depth_error[rows] = o["drum_angle"], 0.0
         return self._look(o, rows)
 
     def advance(self, observation: Observation) -> Float32Array:
         """Features (N, F) of all rows, whose observations (N, K) are one control step later."""
-        o, radius = self._lifts.columns(observation), self._lifts.winch.radius
-        heave_rate, drum_angle = o["pulley_velocity_z"], o["drum_angle"]
-        speed = 0.5 * (heave_rate + self._heave_rate) - radius * (drum_angle - self._drum_angle) / self._period
-        self._heave_rate, self._drum_angle = heave_rate, drum_angle
-        self._pulley.advance(heave_rate)
-        self._waves.advance(heave_rate)
-        self._rope.advance(speed, self._lifts.stretch(o))
-        paid_out = radius * (drum_angle - self._first_angle) + self._rope.stretch
-        self._waves.correct(o["depth_error"] - self._waves.heave() + paid_out)
-        self._depth_error = self._waves.heave() - paid_out
+        o = self._lifts.columns(observation)
+        self._observer.advance(self._turned, o)
+        self._pulley.advance(o["pulley_velocity_z"])
         return self._look(o, ALL)
 
     def command(self, output: FloatArray) -> FloatArray:
         """Drum speed commands (N,) rad/s for a network's output (N,), in [-1, 1]."""
-        command, turned = self._lifts.winch.command(_turn(self._rise, output, self._lifts))
-        self._turns = np.concatenate([self._turns, turned[None]])[1:] if len(self._turns) else self._turns
+        command, self._turned = self._lifts.winch.command(_turn(self._rise, output, self._lifts))
         return command
 
     def _look(self, o: Columns, rows: Rows) -> Float32Array:
-        lifts, step = self._lifts, self._period
-        depth_error, load_velocity, rope_end = self._present()[rows].T
-        path = self._waves.path(self._delay + step * np.arange(2.0))
-        self._rise[rows] = (path[1] - path[0])[rows]
-        rate = self._waves.rate(self._delay + step * np.arange(3.0))[:, rows]
-        soon, later = np.diff(rate, axis=0) / step
-        acceleration, jerk = self._pulley.rate(rows), self._pulley.bend(rows)
+        lifts = self._lifts
+        depth_error, load_velocity, rope_end, rope_end_speed = self._observer.state()[rows].T
+        self._rise[rows] = self._observer.rises(1)[0, rows]
+        velocity = self._observer.pulley_velocity(3)[:, rows]
+        soon, later = np.diff(velocity, axis=0) / lifts.period
         return _stacked(
             *_of_the_load(np, depth_error, load_velocity, rope_end - depth_error),
-            _rope_end_speed(rate[0], lifts.winch.radius[rows], lifts.winch.speed[rows]),
-            rate[0],
-            acceleration + jerk * (self._delay + 0.5 * step),
+            10.0 * rope_end_speed,
+            velocity[0],
+            self._pulley.rate(rows) + self._ahead * self._pulley.bend(rows),
             soon,
             later,
             *_of_the_lift(o, lifts.frequency[rows]),
         )
-
-    def _present(self) -> FloatArray:
-        """(N, 3) depth error, load's velocity and rope's end, carried over the sensors' delay by the rope's model."""
-        rises = np.diff(self._waves.path(self._period * np.arange(len(self._turns) + 1.0)), axis=0)
-        depth_error, still = self._depth_error, np.zeros_like(self._depth_error)
-        z = np.stack([depth_error, self._rope.load_velocity, depth_error + self._rope.stretch, still], axis=1)
-        for rise, turn in zip(rises, self._turns, strict=True):
-            z[:, 3] = 0.0
-            z = self._model.advance(z, (rise - self._lifts.winch.radius * turn) / self._period)
-        return z[:, :3]
 
 
 Features = StateFeatures | SensedFeatures
@@ -196,7 +165,7 @@ def of_the_state(xp: Any, o: Mapping[str, Any], radius: Any, stretch: Any, frequ
     """
     return (
         *_of_the_load(xp, o["depth_error"], o["load_velocity_z"], stretch),
-        _rope_end_speed(o["pulley_velocity_z"], radius, o["drum_speed"]),
+        10.0 * (o["pulley_velocity_z"] - radius * o["drum_speed"]),
         o["pulley_velocity_z"],
         o["pulley_acceleration_z"],
         *_of_the_lift(o, frequency),
@@ -217,10 +186,6 @@ def wanted_turn(xp: Any, rise: Any, output: Any, radius: Any, max_acceleration: 
 def _of_the_load(xp: Any, depth_error: Any, velocity: Any, stretch: Any) -> tuple[Any, ...]:
     # Beyond some metres only the side of the error: there the agent does what it has learned nearer.
     return 4.0 * xp.tanh(0.5 * depth_error), 2.0 * xp.tanh(10.0 * depth_error), 5.0 * velocity, 20.0 * stretch
-
-
-def _rope_end_speed(pulley_velocity: Any, radius: Any, drum_speed: Any) -> Any:
-    return 10.0 * (pulley_velocity - radius * drum_speed)
 
 
 def _of_the_lift(o: Mapping[str, Any], frequency: Any) -> tuple[Any, ...]:

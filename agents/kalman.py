@@ -14,7 +14,6 @@ from functools import cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import block_diag
 
 from agents.control.rope import RopeModel
 from agents.estimation import ALL, FloatArray, Rows
@@ -67,8 +66,7 @@ def schedule(bank: WaveBank, period: float, hold: int) -> Schedule:
     """Gains of the Kalman filter for a ship at rest at the start, by the recursion of its covariance over 60 s."""
     steps = hold * round(60.0 / period / hold) + hold
     exponent = _exponents(bank)
-    turn = np.exp(exponent * period)
-    a = block_diag(*(np.array([[t.real, -t.imag], [t.imag, t.real]]) for t in turn), np.eye(1))
+    turn = np.append(np.exp(exponent * period), 1.0)[:, None]
     rate = np.append(np.tile([1.0, 0.0], bank.bands), 0.0)
     inverse = 1.0 / exponent
     depth = np.append(np.stack([inverse.real, -inverse.imag], axis=1).ravel(), 1.0)
@@ -77,19 +75,29 @@ def schedule(bank: WaveBank, period: float, hold: int) -> Schedule:
     covariance = np.diag(np.append(np.zeros(2 * bank.bands), 1e-6))
     gains = np.zeros((2, steps, 2 * bank.bands + 1))
     for step in range(1, steps):
-        covariance = a @ covariance @ a.T
+        covariance = _turned(turn, _turned(turn, covariance).T)
         rising = step * period < bank.build_up
         grow = 2.0 * period / bank.build_up if rising else -np.expm1(-2.0 * bank.damping * period)
         covariance[moving, moving] += 2.0 * share * grow
         covariance[-1, -1] += bank.offset_drift * period
         for kind, row, noise in ((0, rate, bank.rate_noise), (1, depth, bank.depth_noise)):
             if kind == 0 or step % hold == 0:
-                seen = covariance @ row
-                gains[kind, step] = seen / (row @ seen + noise**2)
+                seen = (covariance * row).sum(axis=1)
+                gains[kind, step] = seen / ((row * seen).sum() + noise**2)
                 covariance -= np.outer(gains[kind, step], seen)
     paired = gains[..., :-1:2] + 1j * gains[..., 1::2]
     both = np.concatenate([paired, gains[..., -1:]], axis=-1)
     return Schedule(both[0], both[1], hold)
+
+
+def _turned(turn: ComplexArray, columns: FloatArray) -> FloatArray:
+    """Columns (2 bands + 1, n) of oscillators, real and imaginary parts in turn, a control step later.
+
+    No matrix product: the last digit of such a one depends on the threads that happen to share it.
+    """
+    pairs = np.concatenate([columns, np.zeros_like(columns[:1])])
+    later = turn * (pairs[::2] + 1j * pairs[1::2])
+    return np.stack([later.real, later.imag], axis=1).reshape(pairs.shape)[:-1]
 
 
 def _exponents(bank: WaveBank) -> ComplexArray:

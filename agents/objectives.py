@@ -68,7 +68,7 @@ def coarse_step(scenario: Scenario) -> float:
 @scalar
 def _advance(x1, x2, x3, v1, v2, v3, a, b, c, angles, speeds, p, h):  # type: ignore[no-untyped-def]
     """Inner step of length h: pulley a, b, c, drum angles and speeds at its start, middle and end."""
-    target, to_pulley, stiffness, damping, mass, gravity, free_length, radius = p
+    target, to_pulley, stiffness, damping, inverse_mass, gravity, free_length, radius = p
     la, lb, lc = free_length + radius * angles[0], free_length + radius * angles[1], free_length + radius * angles[2]
     ra, rb, rc = radius * speeds[0], radius * speeds[1], radius * speeds[2]
     return rk4_step(
@@ -85,7 +85,7 @@ def _advance(x1, x2, x3, v1, v2, v3, a, b, c, angles, speeds, p, h):  # type: ig
         target,
         to_pulley,
         damping,
-        mass,
+        inverse_mass,
         gravity,
     )
 
@@ -192,7 +192,7 @@ class Objective:
             crane.drum_to_pulley,
             float(crane.rope.axial_stiffness),
             float(scenario.rope_damping),
-            float(scenario.load_mass),
+            1.0 / float(scenario.load_mass),
             float(scenario.gravity),
             scenario.free_length,
             crane.winch.drum_radius,

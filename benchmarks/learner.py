@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import gymnasium
 import numpy as np
@@ -37,6 +37,9 @@ LOOKS_EVERY: Final = 16_384
 """Control steps between two looks."""
 
 
+Setup = Literal["this package", "plain"]
+
+
 @dataclass(frozen=True)
 class Options:
     """How long to try."""
@@ -57,7 +60,7 @@ class Options:
 class Outcome:
     """One run."""
 
-    setup: Literal["this package", "plain"]
+    setup: Setup
     seed: int
     reached: bool
     seconds: float
@@ -65,6 +68,27 @@ class Outcome:
     timesteps: int
     reductions: list[float]
     """Median heave reduction at each look."""
+    environment: float
+    """Share of these seconds in the environment's steps, resets and features among them."""
+    updates: float
+    """Share in the learner's updates; the rest is choosing actions and keeping them."""
+
+
+class Stopwatch:
+    """Time spent in a method of an object."""
+
+    def __init__(self, owner: Any, method: str) -> None:
+        self.seconds = 0.0
+        self._call = getattr(owner, method)
+        setattr(owner, method, self)
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Call the method."""
+        begin = time.perf_counter()
+        try:
+            return self._call(*args, **kwargs)
+        finally:
+            self.seconds += time.perf_counter() - begin
 
 
 class Plain:
@@ -119,13 +143,28 @@ class Clock(BaseCallback):
         self._since = time.perf_counter()
 
 
+def watch(setup: Setup, seed: int, model: BaseAlgorithm, timesteps: int, clock: Clock) -> Outcome:
+    """Learn until the clock says so."""
+    environment, updates = Stopwatch(model.env, "step"), Stopwatch(model, "train")
+    model.learn(timesteps, callback=clock)
+    return Outcome(
+        setup,
+        seed,
+        clock.reached,
+        clock.seconds,
+        model.num_timesteps,
+        clock.reductions,
+        environment.seconds / clock.seconds,
+        updates.seconds / clock.seconds,
+    )
+
+
 def ours(seed: int, options: Options) -> Outcome:
     """This package's PPO."""
     chosen = ppo.Options(seed=seed)
     learner = ppo.build(chosen)
     clock = Clock(lambda: to_policy(learner, chosen)[0], options)
-    learner.model.learn(chosen.timesteps, callback=clock)
-    return Outcome("this package", seed, clock.reached, clock.seconds, learner.model.num_timesteps, clock.reductions)
+    return watch("this package", seed, learner.model, chosen.timesteps, clock)
 
 
 def plain(seed: int, options: Options) -> Outcome:
@@ -150,8 +189,7 @@ def plain(seed: int, options: Options) -> Outcome:
         device="cpu",
     )
     clock = Clock(lambda: Plain(model, rows), options)
-    model.learn(10**8, callback=clock)
-    return Outcome("plain", seed, clock.reached, clock.seconds, model.num_timesteps, clock.reductions)
+    return watch("plain", seed, model, 10**8, clock)
 
 
 def main() -> int:
@@ -167,7 +205,8 @@ def main() -> int:
                 best = max(outcome.reductions, default=0.0)
                 end = "reached" if outcome.reached else f"given up at {best:.1%}"
                 console.print(
-                    f"{outcome.setup}, seed {seed}: {end}, {outcome.seconds:.0f} s, {outcome.timesteps:,} steps"
+                    f"{outcome.setup}, seed {seed}: {end}, {outcome.seconds:.1f} s, {outcome.timesteps:,} steps; "
+                    f"environment {outcome.environment:.0%}, updates {outcome.updates:.0%}"
                 )
         mine, theirs = ([o.seconds for o in outcomes if o.setup == setup] for setup in ("this package", "plain"))
         ratio = float(np.median([t / m for m, t in zip(mine, theirs, strict=True)]))

@@ -265,7 +265,7 @@ def test_a_rope_that_parts_ends_the_episode():
         ({"rfes": (10, 8)}, r"rfes = \(10, 8\): only with model=\"rfem\""),
         ({"rfem_modes": 5}, r"rfem_modes = 5: only with"),
         ({"model": "rfem", "rfes": (10, 7)}, r"rfes = \(10, 7\): the beam's number must be even"),
-        ({"model": "rfem", "rfes": 10}, r"rfes = 10: must be a pair"),
+        ({"model": "rfem", "rfes": 10}, "rfes = 10: must be a tuple of two integers"),
         ({"model": "rfem", "rfes": (0, 2)}, r"rfes \(leg\) = 0"),
         ({"model": "rfem", "rfem_modes": 0}, r"rfem_modes = 0"),
     ],

@@ -23,6 +23,7 @@ from aframe_env.scenario import ScenarioSource
 from aframe_env.simulation import Simulation
 from agents.features import LIMIT, STATE_FEATURES, StateFeatures, features_for
 
+FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 
 
@@ -33,6 +34,17 @@ def shaped(xp: Any, mean_square: Any, scale: float, knee: float) -> Any:
     """
     rms = xp.sqrt(xp.clip(mean_square, None, 1e4))
     return -scale * (knee * xp.log1p(rms / knee) if math.isfinite(knee) else rms)
+
+
+def median_reduction(error_sum: FloatArray, still_sum: FloatArray) -> float:
+    """Median over N rows of the heave reduction.
+
+    Integrals (N,) m² s over the same time: of the squared depth error, and of the pulley's squared heave, which stands
+    for what the load of a still drum would do.
+    """
+    moved = still_sum > 0.0
+    left = np.sqrt(error_sum[moved] / still_sum[moved])
+    return 1.0 - float(np.median(left)) if len(left) else 0.0
 
 
 class TrainingVecEnv(VecEnv):
@@ -85,8 +97,7 @@ class TrainingVecEnv(VecEnv):
         self._left = np.zeros(rows, dtype=np.int64)
         self._return = np.zeros(rows)
         self._length = np.zeros(rows, dtype=np.int64)
-        self._error_sum = 0.0
-        self._still_sum = 0.0
+        self._error_sum, self._still_sum = np.zeros((2, rows))
 
     @property
     def quantities(self) -> tuple[task.Quantity, ...]:
@@ -94,12 +105,9 @@ class TrainingVecEnv(VecEnv):
         return self._simulation.quantities
 
     def take_reduction(self) -> float:
-        """Heave reduction over all steps since the last call, exploration included.
-
-        The pulley's heave stands for what the load of a still drum would do.
-        """
-        reduction = 1.0 - math.sqrt(self._error_sum / self._still_sum) if self._still_sum else 0.0
-        self._error_sum = self._still_sum = 0.0
+        """Median over the rows of the heave reduction since the last call, exploration included."""
+        reduction = median_reduction(self._error_sum, self._still_sum)
+        self._error_sum[:] = self._still_sum[:] = 0.0
         return reduction
 
     def reset(self) -> Float32Array:
@@ -117,8 +125,8 @@ class TrainingVecEnv(VecEnv):
         simulation = self._simulation
         simulation.advance(self._commands)
         cost = simulation.results[:, task.COST]
-        self._error_sum += float(cost.sum())
-        self._still_sum += float(np.square(simulation.state[:, 6]).sum()) * simulation.control_period
+        self._error_sum += cost
+        self._still_sum += np.square(simulation.state[:, 6]) * simulation.control_period
         rewards = shaped(np, cost / simulation.control_period, self._reward_scale, self._reward_knee)
         self._return += rewards
         self._length += 1

@@ -77,9 +77,12 @@ def versions() -> dict[str, str]:
 
 @contextlib.contextmanager
 def user_errors() -> Iterator[None]:
-    """Turn bad input, a failing disk and a missing extra into one line on standard error and exit status 2."""
+    """One line on standard error for bad input, a failing disk and a missing extra (status 2) and Ctrl-C (130)."""
     try:
         yield
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        raise SystemExit(130) from None
     except (InvalidValue, OSError, DependencyNotInstalled) as error:
         print(f"error: {error}", file=sys.stderr)
         raise SystemExit(2) from None

@@ -29,9 +29,6 @@ class Options(LearningOptions):
     """Depth error at which a row starts anew, m; its last state's value stands for the rest."""
     reward_scale: float = 20.0
     """Reward for a metre of root mean square depth error over a step."""
-    reward_knee: float = 0.05
-    """Depth error beyond which the reward falls with its logarithm only, m: the critics' accuracy would otherwise be
-    spent on the loads that drift far off."""
     critic_hidden: int = 128
     """Units of each hidden layer of the critics."""
     replay: int = 200_000

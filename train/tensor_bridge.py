@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Final
 
 import torch
@@ -11,7 +10,7 @@ from tensordict import TensorDict
 from aframe_env import task
 from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
 from agents.tensor_features import TensorStateFeatures
-from train.bridge import shaped
+from train.bridge import median_reduction, shaped
 
 _NAMES: Final = [quantity.name for quantity in task.STATE]
 _DEPTH_ERROR: Final = _NAMES.index("depth_error")
@@ -39,7 +38,7 @@ class TrainingRows:
         self.max_episode_length = env.max_episode_length
         self.quantities: tuple[task.Quantity, ...] = task.STATE
         self._period = env.cfg.control_period
-        self._errors, self._still = torch.zeros((2, 1), dtype=torch.float64, device=self.device)
+        self._error_sum, self._still_sum = torch.zeros((2, env.num_envs), dtype=torch.float64, device=self.device)
         self.reset()
 
     @property
@@ -67,8 +66,8 @@ class TrainingRows:
         commands = self._features.command(self._env.get_observations()[GROUP], actions)
         _, rewards, dones, extras = self._env.step(commands)
         final, cost = extras["final_obs"], -rewards.double()
-        self._errors += cost.sum()
-        self._still += final[:, _PULLEY_HEAVE].double().square().sum() * self._period
+        self._error_sum += cost
+        self._still_sum += final[:, _PULLEY_HEAVE].double().square() * self._period
         rewards = shaped(torch, cost / self._period, self._reward_scale, self._reward_knee).float()
         drifted = (final[:, _DEPTH_ERROR].abs() > self._drift_limit) & ~dones
         self._env.reset(drifted)
@@ -76,8 +75,8 @@ class TrainingRows:
         return self.get_observations(), rewards, dones | drifted, extras
 
     def take_reduction(self) -> float:
-        """Heave reduction over all steps since the last call, exploration included."""
-        errors, still = self._errors.item(), self._still.item()
-        self._errors.zero_()
-        self._still.zero_()
-        return 1.0 - math.sqrt(errors / still) if still else 0.0
+        """Median over the rows of the heave reduction since the last call, exploration included."""
+        reduction = median_reduction(self._error_sum.cpu().numpy(), self._still_sum.cpu().numpy())
+        self._error_sum.zero_()
+        self._still_sum.zero_()
+        return reduction

@@ -65,6 +65,7 @@ TUNABLE: Final[dict[Algorithm, Tunable]] = {
             "gae_lambda": Range(0.8, 0.98),
             "clip_range": Range(0.1, 0.4),
             "log_std_init": Range(-2.5, -0.5),
+            "reward_knee": Range(0.005, 0.2, logarithmic=True),
         },
         {"n_steps": (32, 64, 128), "n_epochs": (5, 10, 15), "batch_size": (512, 1024, 2048)},
     ),

@@ -104,12 +104,24 @@ def _fused(typing_context, a, b, c):  # type: ignore[no-untyped-def]
     return types.float64(a, b, c), generate
 
 
+def _selected(typing_context, condition, a, b):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        return builder.select(*arguments)
+
+    return types.float64(types.boolean, types.float64, types.float64), generate
+
+
 def _rounded_twice(a: float, b: float, c: float) -> float:
     return a * b + c
 
 
-# Uncompiled, as numba's CUDA simulator needs it, Python has nothing better before 3.13.
+def _chosen(condition: bool, a: float, b: float) -> float:
+    return a if condition else b
+
+
+# In numba's CUDA simulator all of it runs as plain Python, which has no fma before 3.13.
 _fused_multiply_add: Any = _rounded_twice if config.DISABLE_JIT else intrinsic(_fused)
+_select_value: Any = _chosen if config.DISABLE_JIT else intrinsic(_selected)
 
 
 @scalar
@@ -117,6 +129,29 @@ def fma(a: float, b: float, c: float) -> float:
     """a b + c, rounded once: half the instructions, and the same bits however the compiler arranges the loop."""
     result: float = _fused_multiply_add(a, b, c)
     return result
+
+
+@scalar
+def select(condition: bool, a: float, b: float) -> float:
+    """a where the condition holds, else b.
+
+    Python's own ``a if condition else b`` is a branch: where the result is stored over b, the compiler leaves that
+    store out in some lanes, and masked stores cost more than all the arithmetic.
+    """
+    result: float = _select_value(condition, a, b)
+    return result
+
+
+@scalar
+def larger(a: float, b: float) -> float:
+    """The larger of two numbers."""
+    return select(a > b, a, b)
+
+
+@scalar
+def smaller(a: float, b: float) -> float:
+    """The smaller of two numbers."""
+    return select(a < b, a, b)
 
 
 @cache

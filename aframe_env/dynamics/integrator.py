@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aframe_env.dynamics.compiling import fma, scalar
+from aframe_env.dynamics.compiling import fma, larger, scalar
 from aframe_env.dynamics.simplified import load_acceleration
 
 RopeEnd = tuple[float, float, float, float, float, float, float, float, float]
@@ -24,7 +24,7 @@ def rk4_step(
     target: float,
     drum_to_pulley: float,
     damping: float,
-    mass: float,
+    inverse_mass: float,
     gravity: float,
 ) -> tuple[float, float, float, float, float, float, float, float]:
     """One step of length h [s]: new position (3) and velocity (3), ∫(x_L3 - h)² dt, greatest tension.
@@ -32,7 +32,7 @@ def rk4_step(
     ``start``, ``middle``, ``end``: the rope's upper end at the three times that the scheme looks at. A step of length 0
     changes nothing.
     """
-    p = (drum_to_pulley, damping, 1.0 / mass, gravity)
+    p = (drum_to_pulley, damping, inverse_mass, gravity)
     half = 0.5 * h
     a1, a2, a3, force1 = load_acceleration(x1, x2, x3, v1, v2, v3, *start, *p)
     y1, y2, y3 = fma(half, v1, x1), fma(half, v2, x2), fma(half, v3, x3)
@@ -44,11 +44,8 @@ def rk4_step(
     q1, q2, q3 = fma(h, u1, x1), fma(h, u2, x2), fma(h, u3, x3)
     r1, r2, r3 = fma(h, c1, v1), fma(h, c2, v2), fma(h, c3, v3)
     d1, d2, d3, force4 = load_acceleration(q1, q2, q3, r1, r2, r3, *end, *p)
-    sixth = h / 6.0
+    sixth = h * (1.0 / 6.0)
     e1, e2, e3, e4 = x3 - target, y3 - target, z3 - target, q3 - target
-    peak = force1 if force1 > force2 else force2
-    peak = force3 if force3 > peak else peak
-    peak = force4 if force4 > peak else peak
     return (
         fma(sixth, fma(2.0, w1 + u1, v1 + r1), x1),
         fma(sixth, fma(2.0, w2 + u2, v2 + r2), x2),
@@ -57,5 +54,5 @@ def rk4_step(
         fma(sixth, fma(2.0, b2 + c2, a2 + d2), v2),
         fma(sixth, fma(2.0, b3 + c3, a3 + d3), v3),
         sixth * fma(2.0, fma(e2, e2, e3 * e3), fma(e1, e1, e4 * e4)),
-        peak,
+        larger(larger(force1, force2), larger(force3, force4)),
     )

@@ -107,6 +107,9 @@ ELAPSED: Final = _take(1)
 """Time from the knot before to the start of the segment."""
 WINCH: Final = _take(7)
 """Plan of the winch: direction, ramp time, start of decay, first decaying half step, error, start angle, speed."""
+INVERSE_MASS: Final = _take(1)
+STIFFNESS: Final = _take(1)
+"""c_R of the rope at the start of the inner step."""
 
 ROW_SLOTS: Final = _next()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aframe_env.dynamics.compiling import fma, scalar
+from aframe_env.dynamics.compiling import fma, larger, scalar
 
 
 @scalar
@@ -12,5 +12,4 @@ def tension(elongation: float, elongation_rate: float, stiffness: float, damping
     ``elongation`` is Δ [m], ``stiffness`` c_R = E_R F_R / l [N/m] with l the unstretched length between drum and
     load, ``damping`` d_R [N s/m]. A rope never pushes, not even a damped one.
     """
-    force = fma(stiffness, elongation, damping * elongation_rate)
-    return force if force > 0.0 else 0.0
+    return larger(fma(stiffness, elongation, damping * elongation_rate), 0.0)

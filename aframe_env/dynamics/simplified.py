@@ -39,7 +39,8 @@ def load_acceleration(
     u1, u2, u3 = s1 - x1, s2 - x2, s3 - x3
     distance = math.sqrt(fma(u1, u1, fma(u2, u2, fma(u3, u3, 1e-18))))
     inverse = 1.0 / distance
-    rate = fma(u1, ds1 - v1, fma(u2, ds2 - v2, u3 * (ds3 - v3))) * inverse
-    force = tension(distance + drum_to_pulley - length, rate - pay_out_speed, stiffness, damping)
-    pull = force * inverse * inverse_mass
+    stretch_rate = fma(u1, ds1 - v1, fma(u2, ds2 - v2, u3 * (ds3 - v3)))
+    elongation_rate = fma(stretch_rate, inverse, -pay_out_speed)
+    force = tension(distance + (drum_to_pulley - length), elongation_rate, stiffness, damping)
+    pull = force * (inverse * inverse_mass)
     return pull * u1, pull * u2, fma(pull, u3, -gravity), force

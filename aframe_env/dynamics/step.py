@@ -11,8 +11,8 @@ import numpy.typing as npt
 from numba import prange
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.compiling import fma, kernel, parallel_kernel, scalar
-from aframe_env.dynamics.integrator import RopeEnd, rk4_step
+from aframe_env.dynamics.compiling import fma, kernel, larger, parallel_kernel, scalar, select
+from aframe_env.dynamics.integrator import rk4_step
 from aframe_env.dynamics.layout import LANES, Span
 from aframe_env.dynamics.motion import advance_motion, deck_coordinate, end_motion, on_path, start_motion
 from aframe_env.dynamics.simplified import load_acceleration
@@ -68,17 +68,13 @@ def drum_at(row: Array, lanes: int, j: int, elapsed: float, error: float) -> tup
 
 
 @scalar
-def rope_end(row: Array, lanes: int, j: int, elapsed: float, error: float) -> tuple[RopeEnd, float, float]:
-    """Upper end of lane j's rope ``elapsed`` s into the segment, and the drum's angle and speed."""
-    angle, speed = drum_at(row, lanes, j, elapsed, error)
-    t = row[at.ELAPSED * lanes + j] + elapsed
-    s1, d1 = on_path(row, 0, t, lanes, j)
-    s2, d2 = on_path(row, 1, t, lanes, j)
-    s3, d3 = on_path(row, 2, t, lanes, j)
-    radius = row[at.DRUM_RADIUS * lanes + j]
-    length = fma(radius, angle, row[at.FREE_LENGTH * lanes + j])
-    stiffness = row[at.AXIAL_STIFFNESS * lanes + j] / length
-    return (s1, s2, s3, d1, d2, d3, length, radius * speed, stiffness), angle, speed
+def begin_load(row: Array, span: Span) -> None:
+    """What the inner steps of a segment need of mass and rope."""
+    lanes = span.stride
+    for j in range(span.begin, span.end):
+        row[at.INVERSE_MASS * lanes + j] = 1.0 / row[at.MASS * lanes + j]
+        length = fma(row[at.DRUM_RADIUS * lanes + j], row[at.DRUM_ANGLE * lanes + j], row[at.FREE_LENGTH * lanes + j])
+        row[at.STIFFNESS * lanes + j] = row[at.AXIAL_STIFFNESS * lanes + j] / length
 
 
 @scalar
@@ -88,53 +84,60 @@ def inner_step(row: Array, index: int, span: Span) -> None:
     for j in range(span.begin, span.end):
         active = index < row[at.SUBSTEPS * lanes + j]
         full = row[at.INNER_STEP * lanes + j]
-        begin = index * full
+        # A lane whose segment is over finds drum and pulley where they are.
+        place = select(active, index, row[at.SUBSTEPS * lanes + j] - 1.0)
+        middle, end = (place + 0.5) * full, place * full + full
         error0 = row[(at.WINCH + 4) * lanes + j]
         first, decay = row[(at.WINCH + 3) * lanes + j], row[at.HALF_STEP_DECAY * lanes + j]
         error1 = next_error(error0, 2.0 * index + 1.0, first, decay)
-        error2 = next_error(error1, 2.0 * index + 2.0, first, decay)
-        radius, angle0, speed0 = (
-            row[at.DRUM_RADIUS * lanes + j],
-            row[at.DRUM_ANGLE * lanes + j],
-            row[at.DRUM_SPEED * lanes + j],
-        )
-        t1, t2, t3 = row[at.PULLEY * lanes + j], row[(at.PULLEY + 1) * lanes + j], row[(at.PULLEY + 2) * lanes + j]
-        t4, t5, t6 = (
-            row[(at.PULLEY + 3) * lanes + j],
-            row[(at.PULLEY + 4) * lanes + j],
-            row[(at.PULLEY + 5) * lanes + j],
-        )
-        length0 = fma(radius, angle0, row[at.FREE_LENGTH * lanes + j])
-        start = (t1, t2, t3, t4, t5, t6, length0, radius * speed0, row[at.AXIAL_STIFFNESS * lanes + j] / length0)
-        middle, _, _ = rope_end(row, lanes, j, begin + 0.5 * full, error1)
-        end, angle2, speed2 = rope_end(row, lanes, j, begin + full, error2)
-        x1, x2, x3 = (
+        error2 = select(active, next_error(error1, 2.0 * index + 2.0, first, decay), error0)
+        radius, free_length = row[at.DRUM_RADIUS * lanes + j], row[at.FREE_LENGTH * lanes + j]
+        length0 = fma(radius, row[at.DRUM_ANGLE * lanes + j], free_length)
+        rate0 = radius * row[at.DRUM_SPEED * lanes + j]
+        angle1, speed1 = drum_at(row, lanes, j, middle, error1)
+        angle2, speed2 = drum_at(row, lanes, j, end, error2)
+        row[(at.WINCH + 4) * lanes + j] = error2
+        row[at.DRUM_ANGLE * lanes + j] = angle2
+        row[at.DRUM_SPEED * lanes + j] = speed2
+        length1, length2 = fma(radius, angle1, free_length), fma(radius, angle2, free_length)
+        # One division for both; the stiffness at the start is the end's of the inner step before.
+        share = row[at.AXIAL_STIFFNESS * lanes + j] / (length1 * length2)
+        stiffness0, stiffness1, stiffness2 = row[at.STIFFNESS * lanes + j], share * length2, share * length1
+        row[at.STIFFNESS * lanes + j] = stiffness2
+        parted, target = row[at.PARTED * lanes + j], row[at.TARGET * lanes + j]
+        intact = 1.0 - parted
+        since_knot = row[at.ELAPSED * lanes + j]
+        a1, b1 = on_path(row, 0, since_knot + middle, lanes, j)
+        a2, b2 = on_path(row, 1, since_knot + middle, lanes, j)
+        a3, b3 = on_path(row, 2, since_knot + middle, lanes, j)
+        c1, d1 = on_path(row, 0, since_knot + end, lanes, j)
+        c2, d2 = on_path(row, 1, since_knot + end, lanes, j)
+        c3, d3 = on_path(row, 2, since_knot + end, lanes, j)
+        x1, x2, x3, v1, v2, v3, cost, peak = rk4_step(
             row[at.LOAD_POSITION * lanes + j],
             row[(at.LOAD_POSITION + 1) * lanes + j],
             row[(at.LOAD_POSITION + 2) * lanes + j],
-        )
-        v1, v2, v3 = (
             row[at.LOAD_VELOCITY * lanes + j],
             row[(at.LOAD_VELOCITY + 1) * lanes + j],
             row[(at.LOAD_VELOCITY + 2) * lanes + j],
-        )
-        parted, target = row[at.PARTED * lanes + j], row[at.TARGET * lanes + j]
-        intact = 1.0 - parted
-        x1, x2, x3, v1, v2, v3, cost, peak = rk4_step(
-            x1,
-            x2,
-            x3,
-            v1,
-            v2,
-            v3,
-            (*start[:8], intact * start[8]),
-            (*middle[:8], intact * middle[8]),
-            (*end[:8], intact * end[8]),
-            full if active else 0.0,
+            (
+                row[at.PULLEY * lanes + j],
+                row[(at.PULLEY + 1) * lanes + j],
+                row[(at.PULLEY + 2) * lanes + j],
+                row[(at.PULLEY + 3) * lanes + j],
+                row[(at.PULLEY + 4) * lanes + j],
+                row[(at.PULLEY + 5) * lanes + j],
+                length0,
+                rate0,
+                intact * stiffness0,
+            ),
+            (a1, a2, a3, b1, b2, b3, length1, radius * speed1, intact * stiffness1),
+            (c1, c2, c3, d1, d2, d3, length2, radius * speed2, intact * stiffness2),
+            select(active, full, 0.0),
             target,
             row[at.DRUM_TO_PULLEY * lanes + j],
             intact * row[at.ROPE_DAMPING * lanes + j],
-            row[at.MASS * lanes + j],
+            row[at.INVERSE_MASS * lanes + j],
             row[at.GRAVITY * lanes + j],
         )
         row[at.LOAD_POSITION * lanes + j] = x1
@@ -143,24 +146,20 @@ def inner_step(row: Array, index: int, span: Span) -> None:
         row[at.LOAD_VELOCITY * lanes + j] = v1
         row[(at.LOAD_VELOCITY + 1) * lanes + j] = v2
         row[(at.LOAD_VELOCITY + 2) * lanes + j] = v3
+        row[at.PULLEY * lanes + j] = c1
+        row[(at.PULLEY + 1) * lanes + j] = c2
+        row[(at.PULLEY + 2) * lanes + j] = c3
+        row[(at.PULLEY + 3) * lanes + j] = d1
+        row[(at.PULLEY + 4) * lanes + j] = d2
+        row[(at.PULLEY + 5) * lanes + j] = d3
         row[at.STEP_COST * lanes + j] += cost
-        deviation, worst = abs(x3 - target), row[at.OMEGA2 * lanes + j]
-        row[at.OMEGA2 * lanes + j] = deviation if deviation > worst else worst
-        row[(at.WINCH + 4) * lanes + j] = error2 if active else error0
-        row[at.DRUM_ANGLE * lanes + j] = angle2 if active else angle0
-        row[at.DRUM_SPEED * lanes + j] = speed2 if active else speed0
-        row[at.PULLEY * lanes + j] = end[0] if active else t1
-        row[(at.PULLEY + 1) * lanes + j] = end[1] if active else t2
-        row[(at.PULLEY + 2) * lanes + j] = end[2] if active else t3
-        row[(at.PULLEY + 3) * lanes + j] = end[3] if active else t4
-        row[(at.PULLEY + 4) * lanes + j] = end[4] if active else t5
-        row[(at.PULLEY + 5) * lanes + j] = end[5] if active else t6
+        row[at.OMEGA2 * lanes + j] = larger(abs(x3 - target), abs(row[at.OMEGA2 * lanes + j]))
         # A lane that stands still has met its pulley and drum beyond the segment: what it felt there is no tension.
-        row[at.SLACK * lanes + j] = 1.0 if active and peak <= 0.0 else row[at.SLACK * lanes + j]
-        peak = peak if active else 0.0
-        most = row[at.PEAK_TENSION * lanes + j]
-        row[at.PEAK_TENSION * lanes + j] = peak if peak > most else most
-        row[at.PARTED * lanes + j] = 1.0 if peak > row[at.BREAKING_LOAD * lanes + j] else parted
+        slack = active & (peak <= 0.0)
+        row[at.SLACK * lanes + j] = larger(select(slack, 1.0, 0.0), abs(row[at.SLACK * lanes + j]))
+        peak = select(active, peak, 0.0)
+        row[at.PEAK_TENSION * lanes + j] = larger(peak, abs(row[at.PEAK_TENSION * lanes + j]))
+        row[at.PARTED * lanes + j] = 1.0 - select(peak > row[at.BREAKING_LOAD * lanes + j], 0.0, intact)
 
 
 @scalar
@@ -209,6 +208,7 @@ def control_step(row: Array, components: int, segments: int, records: Array, spa
     for _ in range(segments):
         advance_motion(row, components, records, span)
         plan_winch(row, span)
+        begin_load(row, span)
         for index in range(int(most)):
             inner_step(row, index, span)
         end_motion(row, span)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from aframe_env.dynamics.compiling import fma, scalar
+from aframe_env.dynamics.compiling import fma, larger, scalar, select, smaller
 
 
 @scalar
@@ -35,7 +35,7 @@ def plan(
 @scalar
 def next_error(error: float, half_step_index: float, first: float, decay: float) -> float:
     """Speed error at the next half step, given that of the one before it."""
-    return error if half_step_index <= first else error * decay
+    return error * select(half_step_index <= first, 1.0, decay)
 
 
 @scalar
@@ -58,16 +58,12 @@ def drum_state(
     At the limit switches (least and greatest paid-out length) the brake holds the drum.
     """
     ramping = elapsed < ramp_time
-    ramp = elapsed if ramping else ramp_time
-    rest = elapsed - ramp
+    ramp = smaller(elapsed, ramp_time)
     acceleration = direction * max_acceleration
     after_ramp = fma(ramp, fma(0.5 * acceleration, ramp, speed), angle)
-    settled = fma(command, rest, after_ramp) - direction * lag * (error_after_ramp - error)
-    new_angle = after_ramp if ramping else settled
-    new_speed = fma(acceleration, ramp, speed) if ramping else fma(-direction, error, command)
-    low = new_angle <= min_angle
-    high = new_angle >= max_angle
-    new_speed = 0.0 if (low and new_speed < 0.0) or (high and new_speed > 0.0) else new_speed
-    new_angle = min_angle if low else new_angle
-    new_angle = max_angle if high else new_angle
-    return new_angle, new_speed
+    settled = fma(command, elapsed - ramp, after_ramp) - direction * lag * (error_after_ramp - error)
+    new_angle = select(ramping, after_ramp, settled)
+    new_speed = select(ramping, fma(acceleration, ramp, speed), fma(-direction, error, command))
+    new_speed = select(new_angle <= min_angle, larger(new_speed, 0.0), new_speed)
+    new_speed = select(new_angle >= max_angle, smaller(new_speed, 0.0), new_speed)
+    return smaller(larger(new_angle, min_angle), max_angle), new_speed

@@ -16,7 +16,7 @@ from aframe_env.scenario import Scenario
 from aframe_env.sensors import Sensors
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import require_number
-from agents.control.observer import Observer, PolynomialPredictor
+from agents.control.observer import PolynomialObserver
 from agents.control.regulator import Gains, Lifts, Observation, Regulator
 from agents.policy import FloatArray, Knowledge
 
@@ -76,7 +76,7 @@ class SensorFeedback:
     _period: float = field(init=False, repr=False, default=0.1)
     _lifts: Lifts | None = field(init=False, repr=False, default=None)
     _regulator: Regulator = field(init=False, repr=False)
-    _observer: Observer = field(init=False, repr=False)
+    _observer: PolynomialObserver = field(init=False, repr=False)
     _turned: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -92,7 +92,7 @@ class SensorFeedback:
             lifts = self._lifts = Lifts(len(observation), self._period, SENSED)
             o = lifts.start([s.crane for s in self._scenarios], observation)
             self._regulator = lifts.regulator(self.gains)
-            self._observer = Observer(lifts, self.gains.damping_ratio, self.delay, PolynomialPredictor())
+            self._observer = PolynomialObserver(lifts, self.gains.damping_ratio, self.delay)
             self._observer.start(o)
         else:
             lifts = self._lifts

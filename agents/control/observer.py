@@ -2,108 +2,118 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from abc import ABC, abstractmethod
 
 import numpy as np
 
+from aframe_env.crane import GRAVITY
+from aframe_env.sensors import Sensors
 from agents.control.regulator import Columns, Lifts
-from agents.estimation import ALL, DRUM_RADIUS, Estimate, Estimator, FloatArray, Readings, Rows
+from agents.estimation import ALL, DRUM_RADIUS, Estimator, FloatArray, Readings, Rows
+from agents.kalman import RopeFilter, WaveBank, WaveFilter
 
 
-class Predictor(Protocol):
-    """Foretells the pulley's vertical motion from the readings of its velocity."""
-
-    def start(self, heave_rate: FloatArray, estimate: Estimate, rows: Rows) -> None:
-        """Begin in these rows with a first reading (n,) m/s; ``estimate`` is that of all rows."""
-        ...
-
-    def advance(self, heave_rate: FloatArray, estimate: Estimate) -> None:
-        """Take a reading (N,) m/s, and what the estimator makes of all readings, a control step later."""
-        ...
-
-    def path(self, times: FloatArray) -> FloatArray:
-        """Rise (T, N) m of the pulley since the moment that the reading speaks of, ``times`` (T,) s after it."""
-        ...
-
-    def rate(self, times: FloatArray) -> FloatArray:
-        """Its velocity (T, N) m/s."""
-        ...
-
-
-class PolynomialPredictor:
-    """Carries on with the velocity, acceleration and jerk that the estimator finds: good for a fraction of a wave."""
-
-    _estimate: Estimate
-
-    def start(self, heave_rate: FloatArray, estimate: Estimate, rows: Rows) -> None:
-        """Take the estimate."""
-        self._estimate = estimate
-
-    def advance(self, heave_rate: FloatArray, estimate: Estimate) -> None:
-        """Take the estimate."""
-        self._estimate = estimate
-
-    def path(self, times: FloatArray) -> FloatArray:
-        """Rise (T, N) m of the pulley since the moment of the reading."""
-        t, now = times[:, None], self._estimate
-        return t * (now.pulley_velocity + t * (now.pulley_acceleration / 2.0 + t * now.pulley_jerk / 6.0))
-
-    def rate(self, times: FloatArray) -> FloatArray:
-        """Velocity (T, N) m/s."""
-        t, now = times[:, None], self._estimate
-        return now.pulley_velocity + t * (now.pulley_acceleration + t * now.pulley_jerk / 2.0)
-
-
-class Observer:
+class Observer(ABC):
     """The present of N rows, whose readings are late by whole control steps.
 
-    The rope's model carries the estimates over the delay, with what the drums did meanwhile and what the predictor
-    makes of the pulleys' motion.
+    The rope's model carries the estimates over the delay, with what the drums did meanwhile and what is foretold of
+    the pulleys' motion.
     """
 
-    def __init__(self, lifts: Lifts, damping_ratio: float, delay: float, predictor: Predictor) -> None:
+    def __init__(self, lifts: Lifts, damping_ratio: float, delay: float) -> None:
         """``damping_ratio`` of the loads' bobbing, share of critical; ``delay`` in s, rounded to control steps."""
         self._lifts = lifts
         self._damping_ratio = damping_ratio
-        self._predictor = predictor
-        rows = len(lifts.frequency)
         self.model = lifts.model(damping_ratio)
-        self._estimator = Estimator(rows, lifts.period)
-        self._turns = np.zeros((round(delay / lifts.period), rows))
+        self._turns = np.zeros((round(delay / lifts.period), len(lifts.frequency)))
         """(steps of delay, N) how far the drums have turned since the moment that the readings speak of, rad."""
 
     def start(self, o: Columns, rows: Rows = ALL) -> None:
         """Begin lifts, as ``lifts`` has, in these rows with the first readings (n,)."""
         self.model.replace(rows, self._lifts.model(self._damping_ratio, rows))
-        self._estimator.start(self._readings(o, rows), rows)
         self._turns[:, rows] = 0.0
-        self.estimate = self._estimator.estimate(ALL)
-        self._predictor.start(o["pulley_velocity_z"], self.estimate, rows)
+        self._start(o, rows)
 
     def advance(self, turned: FloatArray, o: Columns) -> None:
         """Take the readings a control step later, during which the drums turned by ``turned`` (N,) rad."""
-        self._turns = np.concatenate([self._turns, turned[None]])[1:] if len(self._turns) else self._turns
-        self._estimator.advance(self._readings(o, ALL))
-        self.estimate = self._estimator.estimate(ALL)
-        self._predictor.advance(o["pulley_velocity_z"], self.estimate)
+        if len(self._turns):
+            self._turns = np.concatenate([self._turns, turned[None]])[1:]
+        self._advance(o)
 
     def state(self) -> FloatArray:
         """State z (N, 4) of the rope's model, now."""
-        estimate, period, radius = self.estimate, self._lifts.period, self._lifts.winch.radius
-        late = len(self._turns)
-        rises = np.diff(self._predictor.path(period * np.arange(late + 1.0)), axis=0)
-        still = np.zeros(len(radius))
-        z = np.stack([estimate.depth_error, estimate.load_velocity, estimate.depth_error + estimate.stretch, still], 1)
+        lifts, still = self._lifts, np.zeros(len(self._lifts.frequency))
+        rises = np.diff(self._path(lifts.period * np.arange(len(self._turns) + 1.0)), axis=0)
+        depth_error, load_velocity, stretch = self._load()
+        z = np.stack([depth_error, load_velocity, depth_error + stretch, still], axis=1)
         for rise, turn in zip(rises, self._turns, strict=True):
             z[:, 3] = 0.0
-            z = self.model.advance(z, (rise - radius * turn) / period)
-        z[:, 3] = self._predictor.rate(np.array([period * late]))[0] - radius * self._lifts.winch.speed
+            z = self.model.advance(z, (rise - lifts.winch.radius * turn) / lifts.period)
+        z[:, 3] = self.pulley_velocity(1)[0] - lifts.winch.radius * lifts.winch.speed
         return z
 
     def rises(self, steps: int) -> FloatArray:
         """How far the pulley will rise during each of the coming control steps, (steps, N) m."""
-        times = self._lifts.period * np.arange(len(self._turns), len(self._turns) + steps + 1.0)
-        return np.diff(self._predictor.path(times), axis=0)
+        return np.diff(self._path(self._times(steps + 1)), axis=0)
+
+    def pulley_velocity(self, steps: int) -> FloatArray:
+        """Velocity (steps, N) m/s of the pulley now and at the ends of the coming control steps but one."""
+        return self._rate(self._times(steps))
+
+    def _times(self, count: int) -> FloatArray:
+        """Now and the ends of the coming control steps, s after the moment that the readings speak of."""
+        return self._lifts.period * np.arange(len(self._turns), len(self._turns) + count, dtype=np.float64)
+
+    @abstractmethod
+    def _start(self, o: Columns, rows: Rows) -> None:
+        """Forget the past of these rows."""
+
+    @abstractmethod
+    def _advance(self, o: Columns) -> None:
+        """Take the readings of all rows."""
+
+    @abstractmethod
+    def _load(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Depth error [m], load's velocity [m/s] and stretch beyond that under its weight [m] (N,) at the readings."""
+
+    @abstractmethod
+    def _path(self, times: FloatArray) -> FloatArray:
+        """Rise (T, N) m of the pulley ``times`` (T,) s after the moment that the readings speak of."""
+
+    @abstractmethod
+    def _rate(self, times: FloatArray) -> FloatArray:
+        """Its velocity (T, N) m/s."""
+
+
+class PolynomialObserver(Observer):
+    """Carries on with the pulley's velocity, acceleration and jerk, as ``Estimator`` finds them.
+
+    It has no model of the sea: good for a fraction of a wave.
+    """
+
+    def __init__(self, lifts: Lifts, damping_ratio: float, delay: float) -> None:
+        super().__init__(lifts, damping_ratio, delay)
+        self._estimator = Estimator(len(lifts.frequency), lifts.period)
+
+    def _start(self, o: Columns, rows: Rows) -> None:
+        self._estimator.start(self._readings(o, rows), rows)
+        self._estimate = self._estimator.estimate(ALL)
+
+    def _advance(self, o: Columns) -> None:
+        self._estimator.advance(self._readings(o, ALL))
+        self._estimate = self._estimator.estimate(ALL)
+
+    def _load(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        now = self._estimate
+        return now.depth_error, now.load_velocity, now.stretch
+
+    def _path(self, times: FloatArray) -> FloatArray:
+        t, now = times[:, None], self._estimate
+        return t * (now.pulley_velocity + t * (now.pulley_acceleration / 2.0 + t * now.pulley_jerk / 6.0))
+
+    def _rate(self, times: FloatArray) -> FloatArray:
+        t, now = times[:, None], self._estimate
+        return now.pulley_velocity + t * (now.pulley_acceleration + t * now.pulley_jerk / 2.0)
 
     def _readings(self, o: Columns, rows: Rows) -> Readings:
         return Readings(
@@ -113,3 +123,45 @@ class Observer:
             load_acceleration=self._lifts.load_acceleration(o, rows),
             depth_error=o["depth_error"],
         )
+
+
+class KalmanObserver(Observer):
+    """Follows the pulley by a bank of waves and the load by its bobbing on the rope, each with a Kalman filter."""
+
+    def __init__(self, lifts: Lifts, damping_ratio: float, sensors: Sensors) -> None:
+        """``sensors``: their delay and noise are counted on."""
+        super().__init__(lifts, damping_ratio, sensors.delay)
+        rows, hold = len(lifts.frequency), max(1, round(sensors.depth_error.period / lifts.period))
+        self._tension = sensors.tension
+        self._waves = WaveFilter(rows, lifts.period, hold)
+        self._rope = RopeFilter(rows, WaveBank().rate_noise)
+        self._heave_rate, self._drum_angle, self._first_angle, self._depth_error = np.zeros((4, rows))
+
+    def _start(self, o: Columns, rows: Rows) -> None:
+        lifts, tension = self._lifts, self._tension
+        noise = np.maximum(tension.noise, tension.relative_noise * o["load_mass"] * GRAVITY)
+        model = lifts.model(self._damping_ratio, rows)
+        self._rope.start(model, lifts.period, lifts.stretch_under(noise, o, rows), rows)
+        self._waves.start(rows)
+        self._heave_rate[rows], self._drum_angle[rows] = o["pulley_velocity_z"], o["drum_angle"]
+        self._first_angle[rows], self._depth_error[rows] = o["drum_angle"], 0.0
+
+    def _advance(self, o: Columns) -> None:
+        radius, heave_rate, drum_angle = self._lifts.winch.radius, o["pulley_velocity_z"], o["drum_angle"]
+        paid_out = radius * (drum_angle - self._drum_angle)
+        speed = 0.5 * (heave_rate + self._heave_rate) - paid_out / self._lifts.period
+        self._heave_rate, self._drum_angle = heave_rate, drum_angle
+        self._waves.advance(heave_rate)
+        self._rope.advance(speed, self._lifts.stretch(o))
+        below = radius * (drum_angle - self._first_angle) + self._rope.stretch
+        self._waves.correct(o["depth_error"] - self._waves.heave() + below)
+        self._depth_error = self._waves.heave() - below
+
+    def _load(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        return self._depth_error, self._rope.load_velocity, self._rope.stretch
+
+    def _path(self, times: FloatArray) -> FloatArray:
+        return self._waves.path(times)
+
+    def _rate(self, times: FloatArray) -> FloatArray:
+        return self._waves.rate(times)

@@ -18,8 +18,7 @@ from aframe_env.scenario import Scenario
 from aframe_env.sensors import Sensors
 from aframe_env.task import SENSED
 from aframe_env.validation import InvalidValue, require_integer, require_number
-from agents.control.observer import Observer
-from agents.control.prediction import BankPredictor
+from agents.control.observer import KalmanObserver
 from agents.control.regulator import Lifts, Observation
 from agents.control.rope import RopeModel
 from agents.policy import FloatArray, Knowledge
@@ -77,7 +76,7 @@ class Problem:
 
 @dataclass
 class PredictiveControl:
-    """Model-predictive control on the sensors, with the pulley's motion foretold by a bank of oscillators."""
+    """Model-predictive control on the sensors; the Kalman filters that the agents have too foretell the motion."""
 
     effort: float = 0.026
     """Price of changing the rope end's speed, s²; that of the feedback law beside it."""
@@ -85,8 +84,8 @@ class PredictiveControl:
     """Control steps."""
     damping_ratio: float = 0.03
     """Damping of the load's bobbing on the rope that the law counts on, share of critical."""
-    delay: float = Sensors().delay
-    """From a motion to its reading, s."""
+    sensors: Sensors = field(default_factory=Sensors)
+    """Delay and noise that the law counts on."""
     name: str = "predictive control"
     knows: Knowledge = field(init=False, default=Knowledge.SENSORS)
     _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
@@ -95,14 +94,13 @@ class PredictiveControl:
     _model: RopeModel = field(init=False, repr=False)
     _k: FloatArray = field(init=False, repr=False)
     _problems: dict[int, Problem] = field(init=False, repr=False)
-    _observer: Observer = field(init=False, repr=False)
+    _observer: KalmanObserver = field(init=False, repr=False)
     _turned: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         require_number("effort", self.effort, "s²", low=1e-8, high=1e8)
         require_integer("horizon", self.horizon, low=2, high=1000)
         require_number("damping_ratio", self.damping_ratio, "of critical", low=0.0, high=1.0)
-        require_number("delay", self.delay, "s", low=0.0, high=10.0)
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes; of the scenarios only the crane is looked at."""
@@ -113,8 +111,7 @@ class PredictiveControl:
         if self._lifts is None:
             lifts = self._lifts = Lifts(len(observation), self._period, SENSED)
             o = lifts.start([s.crane for s in self._scenarios], observation)
-            predictor = BankPredictor(len(observation), self._period)
-            self._observer = Observer(lifts, self.damping_ratio, self.delay, predictor)
+            self._observer = KalmanObserver(lifts, self.damping_ratio, self.sensors)
             self._observer.start(o)
             self._model = self._observer.model
             self._k = self._model.gains(self.effort)

@@ -93,3 +93,34 @@ def test_the_rope_filter_follows_a_load_that_it_is_told_of_exactly():
         rope.advance(speed, z[:, 2] - z[:, 0])
     assert rope.load_velocity[0] == pytest.approx(z[0, 1], abs=1e-6)
     assert abs(z[0, 1]) > 0.05
+
+
+def two_sines(times):
+    """Heave rate and heave, m/s and m."""
+    w1, w2 = 0.65, 0.95
+    return (
+        0.6 * np.cos(w1 * times) + 0.4 * np.cos(w2 * times + 1.0),
+        0.6 / w1 * np.sin(w1 * times) + 0.4 / w2 * np.sin(w2 * times + 1.0),
+    )
+
+
+def test_two_sines_are_foretold():
+    """Once the filter has followed them, 0.1 s to 2 s ahead; a held value would be off by 2 sin(ω τ / 2)."""
+    waves = WaveFilter(2, PERIOD, 10)
+    ahead = np.array([0.1, 0.5, 2.0])
+    missed_rate, missed_path, held = [], [], []
+    for k in range(1500):
+        now = k * PERIOD
+        rate, heave = two_sines(now)
+        waves.advance(np.array([rate, 0.0]))
+        if k > 600:
+            later_rate, later_heave = two_sines(now + ahead)
+            missed_rate.append(waves.rate(ahead)[:, 0] - later_rate)
+            missed_path.append(waves.path(ahead)[:, 0] - (later_heave - heave))
+            held.append(rate - later_rate)
+    rms, held_rms = np.sqrt(np.mean(np.square(missed_rate), axis=0)), np.sqrt(np.mean(np.square(held), axis=0))
+    power = 0.5 * (0.6 * 2.0 * np.sin(0.5 * 0.65 * ahead)) ** 2 + 0.5 * (0.4 * 2.0 * np.sin(0.5 * 0.95 * ahead)) ** 2
+    assert held_rms == pytest.approx(np.sqrt(power), rel=0.05)
+    assert (rms < 0.35 * held_rms).all()
+    assert (np.sqrt(np.mean(np.square(missed_path), axis=0)) < 0.35 * ahead * held_rms).all()
+    assert not waves.rate(ahead)[:, 1].any()  # the other row's sea is none of this one's

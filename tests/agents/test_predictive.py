@@ -5,56 +5,12 @@ from scipy.optimize import LinearConstraint, minimize
 from aframe_env import InvalidValue, ScenarioDistribution
 from aframe_env.task import SENSED
 from agents.control.feedback import SensorFeedback
-from agents.control.prediction import Bank, BankPredictor
 from agents.control.predictive import PredictiveControl, Problem
 from agents.control.rope import RopeModel
-from agents.estimation import Estimate
 from agents.policy import DrumStill
 from agents.rollout import held_out_scenarios, run
 
 PERIOD = 0.1
-NOTHING = Estimate(*(np.zeros(2) for _ in range(6)))
-
-
-def two_sines(times):
-    """Heave rate and heave, m/s and m."""
-    w1, w2 = 0.65, 0.95
-    return (
-        0.6 * np.cos(w1 * times) + 0.4 * np.cos(w2 * times + 1.0),
-        0.6 / w1 * np.sin(w1 * times) + 0.4 / w2 * np.sin(w2 * times + 1.0),
-    )
-
-
-def test_two_sines_are_foretold():
-    """Once the filter has followed them, 0.1 s to 2 s ahead; a held value would be off by 2 sin(ω τ / 2)."""
-    predictor = BankPredictor(2, PERIOD)
-    ahead = np.array([0.1, 0.5, 2.0])
-    missed_rate, missed_path, held = [], [], []
-    for k in range(1500):
-        now = k * PERIOD
-        rate, heave = two_sines(now)
-        predictor.advance(np.array([rate, 0.0]), NOTHING)
-        if k > 600:
-            later_rate, later_heave = two_sines(now + ahead)
-            missed_rate.append(predictor.rate(ahead)[:, 0] - later_rate)
-            missed_path.append(predictor.path(ahead)[:, 0] - (later_heave - heave))
-            held.append(rate - later_rate)
-    rms, held_rms = np.sqrt(np.mean(np.square(missed_rate), axis=0)), np.sqrt(np.mean(np.square(held), axis=0))
-    power = 0.5 * (0.6 * 2.0 * np.sin(0.5 * 0.65 * ahead)) ** 2 + 0.5 * (0.4 * 2.0 * np.sin(0.5 * 0.95 * ahead)) ** 2
-    assert held_rms == pytest.approx(np.sqrt(power), rel=0.05)
-    assert (rms < 0.35 * held_rms).all()
-    assert (np.sqrt(np.mean(np.square(missed_path), axis=0)) < 0.35 * ahead * held_rms).all()
-    assert not predictor.rate(ahead)[:, 1].any()  # the other row's sea is none of this one's
-
-
-def test_path_is_the_integral_of_rate():
-    predictor = BankPredictor(2, PERIOD, Bank(bands=6))
-    for reading in ([0.3, 0.1], [0.5, -0.2], [0.1, 0.4]):
-        predictor.advance(np.array(reading), NOTHING)
-    times = np.linspace(0.0, 2.0, 2001)
-    rate = predictor.rate(times)
-    integral = np.concatenate([np.zeros((1, 2)), np.cumsum(0.5e-3 * (rate[1:] + rate[:-1]), axis=0)])
-    assert predictor.path(times) == pytest.approx(integral, abs=1e-6)
 
 
 def problem(frequency=2.0, effort=0.02, horizon=12):

@@ -70,6 +70,13 @@ def test_users_see_one_line(error, capsys):
     assert capsys.readouterr().err.count("\n") == 1
 
 
+def test_an_interrupt_is_told_in_a_word(capsys):
+    with pytest.raises(SystemExit) as stopped, user_errors():
+        raise KeyboardInterrupt
+    assert stopped.value.code == 130
+    assert capsys.readouterr().err == "interrupted\n"
+
+
 def test_mistakes_of_the_program_are_not_hidden():
     with pytest.raises(KeyError), user_errors():
         raise KeyError("bug")
