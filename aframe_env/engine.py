@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.knots import knot_kernels
+from aframe_env.dynamics.start import hang_load, inner_steps, longest_inner_step, write_lift
 from aframe_env.dynamics.step import step_kernels
 from aframe_env.motion import Components, ShipMotion, TabledMotion, has_components
 from aframe_env.scenario import Scenario
@@ -20,11 +21,6 @@ FloatArray = npt.NDArray[np.float64]
 
 MAX_SEGMENT: Final = 0.2
 """Longest stretch of time that one quintic of the pulley's path spans, s."""
-MAX_INNER_STEP: Final = 0.02
-"""Longest inner step, s."""
-INNER_STEP_PHASE: Final = 0.1
-"""Most that the load's bobbing on the rope turns in one inner step, rad: RK4's phase error is then below 1e-6
-of the angle turned."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +44,8 @@ def timing(scenario: Scenario, control_period: float, max_inner_step: float | No
     """Divide a control period [s] for a scenario: the stiffer the rope, the finer the inner step."""
     segments = math.ceil(control_period / MAX_SEGMENT - 1e-9)
     segment = control_period / segments
-    longest = max_inner_step or min(MAX_INNER_STEP, INNER_STEP_PHASE / scenario.rope_frequency)
-    return Timing(segments, segment, max(1, math.ceil(segment / longest - 1e-9)))
+    longest = max_inner_step or longest_inner_step(scenario.rope_frequency)
+    return Timing(segments, segment, inner_steps(segment, longest))
 
 
 class Engine:
@@ -114,6 +110,11 @@ class Engine:
         """Rows in a block."""
         return self._lanes
 
+    @property
+    def records(self) -> FloatArray:
+        """Recorded motions that rows follow: lines of deck coordinates, rates and accelerations, (lines, 18)."""
+        return self._records
+
     def step(self, commands: FloatArray) -> None:
         """Advance every row by one control step with the drum speed commands (rows,) rad/s."""
         if self._lanes == 1:
@@ -165,7 +166,7 @@ class Engine:
         row[at.KNOT_SEGMENTS] = segments
         knot_kernels().write(row, components.frequency, components.response, segments * times.segment)
         self._kernels_of_one.start(row[None], self._components, self._records)
-        _place_load(row, scenario)
+        hang_load(row, 1, 0, scenario.initial == "comoving")
         self._kernels_of_one.start(row[None], self._components, self._records)
         return row
 
@@ -230,37 +231,30 @@ class Engine:
 def _fill_parameters(row: FloatArray, scenario: Scenario, times: Timing) -> None:
     crane = scenario.crane
     winch, rope = crane.winch, crane.rope
-    row[at.MASS] = scenario.load_mass
     row[at.GRAVITY] = scenario.gravity
-    row[at.TARGET] = scenario.target_level
     row[at.AXIAL_STIFFNESS] = rope.axial_stiffness
-    row[at.ROPE_DAMPING] = scenario.rope_damping
     row[at.BREAKING_LOAD] = rope.breaking_load
-    row[at.FREE_LENGTH] = scenario.free_length
     row[at.DRUM_TO_PULLEY] = crane.drum_to_pulley
     row[at.DRUM_RADIUS] = winch.drum_radius
     row[at.MAX_SPEED] = winch.max_speed
     row[at.MAX_ACCELERATION] = winch.max_acceleration
     row[at.LAG] = winch.lag
-    row[at.MIN_ANGLE] = (winch.min_rope_length - scenario.free_length) / winch.drum_radius
-    row[at.MAX_ANGLE] = (winch.max_rope_length - scenario.free_length) / winch.drum_radius
     row[at.PULLEY_ON_DECK : at.PULLEY_ON_DECK + 3] = crane.pulley_position
     row[at.RAMP_RATE] = 1.0 / scenario.ramp if scenario.ramp else 0.0
     row[at.RAMP_OFFSET] = 0.0 if scenario.ramp else 1.0
     row[at.CONTROL_PERIOD] = times.segment
-    row[at.SUBSTEPS] = times.substeps
-    row[at.INNER_STEP] = times.inner_step
-    row[at.HALF_STEP_DECAY] = math.exp(-0.5 * times.inner_step / winch.lag) if winch.lag else 0.0
-
-
-def _place_load(row: FloatArray, scenario: Scenario) -> None:
-    """Hang the load at rest on its rope under the pulley, where the pulley is at the start."""
-    pulley = row[at.PULLEY : at.PULLEY + 3]
-    row[at.LOAD_POSITION : at.LOAD_POSITION + 3] = pulley
-    row[at.LOAD_POSITION + 2] -= scenario.rope_length
-    if scenario.initial == "comoving":
-        row[at.LOAD_VELOCITY : at.LOAD_VELOCITY + 3] = row[at.PULLEY + 3 : at.PULLEY + 6]
-    row[at.OMEGA2] = abs(row[at.LOAD_POSITION + 2] - scenario.target_level)
+    write_lift(
+        row,
+        1,
+        0,
+        scenario.load_mass,
+        scenario.target_level,
+        scenario.rope_damping,
+        scenario.free_length,
+        winch.min_rope_length,
+        winch.max_rope_length,
+        times.substeps,
+    )
 
 
 __all__ = ["Engine", "InvalidValue", "Timing", "timing"]

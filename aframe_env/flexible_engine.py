@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,6 +15,7 @@ from aframe_env.dynamics.flexible.reduction import STATIC_SHAPES
 from aframe_env.dynamics.flexible.step import flexible_kernels
 from aframe_env.dynamics.flexible.tables import step_table
 from aframe_env.dynamics.rfem.chain import Division
+from aframe_env.dynamics.start import inner_steps
 from aframe_env.engine import Engine, FloatArray, Timing
 from aframe_env.motion import Components
 from aframe_env.scenario import Scenario
@@ -145,7 +145,7 @@ class FlexibleEngine(Engine):
         # Halved rather than fitted, so that a distribution of ropes needs few tables.
         while longest * scenario.rope_frequency > ROPE_PHASE:
             longest *= 0.5
-        return Timing(self._segments, segment, max(1, math.ceil(segment / longest - 1e-9)))
+        return Timing(self._segments, segment, inner_steps(segment, longest))
 
     def _line(self, scenario: Scenario) -> int:
         """Line of a scenario's frame in the tables, which it is added to when new."""

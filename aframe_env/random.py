@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from aframe_env.dynamics.compiling import scalar
+from aframe_env.dynamics.compiling import kernel, scalar
 
 
 @scalar
@@ -18,6 +18,20 @@ def uniform(seed: Any, index: Any) -> float:
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     z = z ^ (z >> np.uint64(31))
     return float(z >> np.uint64(11)) / 9007199254740992.0
+
+
+@scalar
+def draw_seed(seed: int, index: int) -> int:
+    """Seed for further draws, in [0, 2^53)."""
+    return int(uniform(seed, index) * 9007199254740992.0)
+
+
+@kernel
+def episode_uniforms(seed: int, row: int, episode: int, numbers: Any) -> None:
+    """Fill ``numbers`` (n,) with those of a row's ``episode``: uniform, the same whatever the other rows draw."""
+    own, size = draw_seed(seed, row), numbers.shape[0]
+    for k in range(size):
+        numbers[k] = uniform(own, size * episode + k)
 
 
 @scalar

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 
 from aframe_env.crane import GRAVITY, Crane
+from aframe_env.dynamics.start import critical_damping, free_length
 from aframe_env.motion import HarmonicMotion, ShipMotion, has_components, is_tabled
 from aframe_env.sea import FULL_TURN, Sea, SeaMotion, dnv_gamma
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
@@ -21,7 +22,10 @@ INITIALS: tuple[str, ...] = ("comoving", "rest")
 Range = float | tuple[float, float]
 """One exact value, or the interval that a value is drawn from uniformly."""
 
-_UNIFORMS = 8  # numbers that each sub-stream takes from the generator, however many it needs
+SUBSTREAM: Final = 8
+"""Numbers that sea, load and rope each take from the generator, however many they need."""
+NUMBERS: Final = 3 * SUBSTREAM
+"""Random numbers that a scenario is drawn with."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +97,7 @@ class Scenario:
     @cached_property
     def free_length(self) -> float:
         """l_0, m: unstretched length between drum and load that holds the load at its target, ship at rest."""
-        return free_length(self.crane, self.rope_length, self.weight)
+        return _free_length(self.crane, self.rope_length, self.weight)
 
     @property
     def rope_stiffness(self) -> float:
@@ -106,9 +110,8 @@ class Scenario:
         return math.sqrt(self.rope_stiffness / self.load_mass)
 
 
-def free_length(crane: Crane, rope_length: float, weight: float) -> float:
-    """Unstretched length between drum and a load of ``weight`` N that hangs ``rope_length`` m below the pulley, m."""
-    return (rope_length + crane.drum_to_pulley) / (1.0 + weight / crane.rope.axial_stiffness)
+def _free_length(crane: Crane, rope_length: float, weight: float) -> float:
+    return free_length(rope_length, crane.drum_to_pulley, weight, crane.rope.axial_stiffness)
 
 
 def _require_range(name: str, value: Any, unit: str, low: float, high: float, low_open: bool = False) -> None:
@@ -175,14 +178,14 @@ class ScenarioDistribution:
         self._require_rope()
         # The corners of the distribution must be scenarios: refuse now rather than in the middle of a run.
         for u in (0.0, 1.0):
-            self._build(np.full(_UNIFORMS, u), np.full(_UNIFORMS, u), np.full(_UNIFORMS, u))
+            self._build(np.full(SUBSTREAM, u), np.full(SUBSTREAM, u), np.full(SUBSTREAM, u))
 
     def _require_rope(self) -> None:
         """Raise where a rope is longer or shorter than the winch allows, in the user's words."""
         least, most = self.crane.winch.min_rope_length, self.crane.winch.max_rope_length
         for length in self.rope_length if isinstance(self.rope_length, tuple) else (self.rope_length,):
             for mass in self.load_mass if isinstance(self.load_mass, tuple) else (self.load_mass,):
-                paid_out = free_length(self.crane, length, mass * GRAVITY)
+                paid_out = _free_length(self.crane, length, mass * GRAVITY)
                 if not least < paid_out < most:
                     raise InvalidValue(
                         f"rope_length = {self.rope_length!r} m: {length:g} m needs {paid_out:g} m of unstretched rope "
@@ -191,12 +194,15 @@ class ScenarioDistribution:
 
     def draw(self, rng: np.random.Generator) -> Scenario:
         """Draw one scenario."""
-        u = rng.random(3 * _UNIFORMS)
-        return self._build(u[:_UNIFORMS], u[_UNIFORMS : 2 * _UNIFORMS], u[2 * _UNIFORMS :])
+        return self.at(rng.random(NUMBERS))
+
+    def at(self, uniforms: np.ndarray) -> Scenario:
+        """Return the scenario that these numbers (NUMBERS,) in [0, 1) stand for: sea, load and rope."""
+        return self._build(uniforms[:SUBSTREAM], uniforms[SUBSTREAM : 2 * SUBSTREAM], uniforms[2 * SUBSTREAM :])
 
     def nominal(self) -> Scenario:
         """Return the scenario in the middle of every interval, with the first realisation of its sea."""
-        half = np.full(_UNIFORMS, 0.5)
+        half = np.full(SUBSTREAM, 0.5)
         sea = half.copy()
         sea[4] = 0.0
         return self._build(sea, half, half)
@@ -217,13 +223,13 @@ class ScenarioDistribution:
         )
         load_mass, rope_length = _draw(self.load_mass, m[0]), _draw(self.rope_length, r[0])
         weight = load_mass * GRAVITY
-        stiffness = self.crane.rope.axial_stiffness / free_length(self.crane, rope_length, weight)
+        stiffness = self.crane.rope.axial_stiffness / _free_length(self.crane, rope_length, weight)
         return Scenario(
             crane=self.crane,
             motion=SeaMotion(sea=sea, vessel=self.vessel),
             load_mass=load_mass,
             target_level=self.crane.pulley_position[2] - rope_length,
-            rope_damping=_draw(self.rope_damping_ratio, r[1]) * 2.0 * math.sqrt(stiffness * load_mass),
+            rope_damping=_draw(self.rope_damping_ratio, r[1]) * critical_damping(stiffness, load_mass),
             ramp=self.ramp,
         )
 

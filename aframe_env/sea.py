@@ -12,14 +12,14 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
-from typing import Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics.compiling import kernel
+from aframe_env.dynamics.waves import draw_wave, respond, response_cell
 from aframe_env.motion import ComplexArray, Components, FloatArray
-from aframe_env.random import uniform
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
 from aframe_env.vessel import Vessel
 
@@ -28,8 +28,7 @@ SPECTRA: tuple[str, ...] = ("jonswap", "pierson-moskowitz")
 
 FULL_TURN = 2.0 * math.pi
 """rad."""
-
-_GAMMA_STEP = 0.1
+_GAMMA_STEP: Final = 0.1
 _GAMMAS = np.linspace(1.0, 10.0, 91)
 _QUANTILES = 2049
 
@@ -40,6 +39,16 @@ def dnv_gamma(hs: float, tp: float) -> float:
     if ratio <= 3.6:
         return 5.0
     return max(1.0, math.exp(5.75 - 1.15 * ratio))
+
+
+def gamma_place(gamma: float) -> float:
+    """Place of a peak enhancement factor in ``frequency_quantiles``, in lines."""
+    return (gamma - 1.0) / _GAMMA_STEP
+
+
+def amplitude_of_each(hs: float, components: int) -> float:
+    """Amplitude [m] of each of so many waves of equal energy that make up a sea of significant wave height hs [m]."""
+    return hs * math.sqrt(2.0 / components) / 4.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,16 +98,16 @@ class Sea:
 
     def waves(self) -> Waves:
         """Return the realisation: one regular wave for each component."""
-        frequency, direction, phase = _realise_kernel()(
+        frequency, direction, phase = _sea_kernels().realise(
             self.seed,
             self.components,
             2.0 * math.pi / self.tp,
-            _frequency_quantiles(),
-            (self.peak_enhancement - _GAMMAS[0]) / _GAMMA_STEP,
+            frequency_quantiles(),
+            gamma_place(self.peak_enhancement),
             self.heading,
-            _direction_quantiles(self.spreading),
+            direction_quantiles(self.spreading),
         )
-        amplitude = np.full(self.components, self.hs * math.sqrt(2.0 / self.components) / 4.0)
+        amplitude = np.full(self.components, amplitude_of_each(self.hs, self.components))
         return Waves(frequency, direction, amplitude, phase)
 
 
@@ -137,7 +146,7 @@ class SeaMotion:
     def components(self) -> Components:
         """Return the deck's response to each wave."""
         waves = self.sea.waves()
-        response = _respond(
+        response = _sea_kernels().respond(
             waves.frequency,
             waves.direction,
             waves.amplitude,
@@ -171,14 +180,14 @@ def _inverse(grid: FloatArray, density: FloatArray) -> FloatArray:
 
 
 @lru_cache(maxsize=1)
-def _frequency_quantiles() -> FloatArray:
+def frequency_quantiles() -> FloatArray:
     """Quantiles of ω/ω_p for each γ of _GAMMAS: (91, _QUANTILES)."""
     grid = _shape_grid()
     return np.stack([_inverse(grid, _shape(grid, float(gamma))) for gamma in _GAMMAS])
 
 
 @lru_cache(maxsize=16)
-def _direction_quantiles(spreading: int | None) -> FloatArray:
+def direction_quantiles(spreading: int | None) -> FloatArray:
     """Quantiles of the direction about the mean, rad: (_QUANTILES,)."""
     if spreading is None:
         return np.zeros(_QUANTILES)
@@ -189,18 +198,13 @@ def _direction_quantiles(spreading: int | None) -> FloatArray:
     return _inverse(grid, np.array([float(spread(1.0, angle)) for angle in grid]))
 
 
-@kernel
-def _quantile(table: FloatArray, probability: float) -> float:
-    place = probability * (table.shape[0] - 1)
-    low = min(int(place), table.shape[0] - 2)
-    weight = place - low
-    value: float = (1.0 - weight) * table[low] + weight * table[low + 1]
-    return value
+class _SeaKernels(NamedTuple):
+    realise: Callable[..., tuple[FloatArray, FloatArray, FloatArray]]
+    respond: Callable[..., ComplexArray]
 
 
 @cache
-def _realise_kernel() -> Callable[..., tuple[FloatArray, FloatArray, FloatArray]]:
-
+def _sea_kernels() -> _SeaKernels:
     @kernel
     def realise(
         seed: int,
@@ -214,42 +218,28 @@ def _realise_kernel() -> Callable[..., tuple[FloatArray, FloatArray, FloatArray]
         frequency = np.empty(components)
         direction = np.empty(components)
         phase = np.empty(components)
-        low = min(int(gamma_place), frequency_table.shape[0] - 2)
-        weight = gamma_place - low
         for k in range(components):
-            probability = (k + uniform(seed, 3 * k)) / components
-            x = (1.0 - weight) * _quantile(frequency_table[low], probability)
-            x += weight * _quantile(frequency_table[low + 1], probability)
-            frequency[k] = peak * x
-            phase[k] = 2.0 * math.pi * uniform(seed, 3 * k + 1)
-            direction[k] = heading + _quantile(direction_table, uniform(seed, 3 * k + 2))
+            frequency[k], direction[k], phase[k] = draw_wave(
+                seed, k, components, peak, frequency_table, gamma_place, heading, direction_table
+            )
         return frequency, direction, phase
 
-    return realise
+    @kernel
+    def respond_to(
+        frequency: FloatArray,
+        direction: FloatArray,
+        amplitude: FloatArray,
+        phase: FloatArray,
+        grid_frequency: FloatArray,
+        grid_heading: FloatArray,
+        table: ComplexArray,
+    ) -> ComplexArray:
+        response = np.empty((frequency.shape[0], 6), dtype=np.complex128)
+        for k in range(frequency.shape[0]):
+            i, u, j, v = response_cell(grid_frequency, grid_heading, frequency[k], direction[k])
+            wave = amplitude[k] * complex(math.cos(phase[k]), math.sin(phase[k]))
+            for d in range(6):
+                response[k, d] = wave * respond(table, i, u, j, v, d)
+        return response
 
-
-@kernel
-def _respond(
-    frequency: FloatArray,
-    direction: FloatArray,
-    amplitude: FloatArray,
-    phase: FloatArray,
-    grid_frequency: FloatArray,
-    grid_heading: FloatArray,
-    table: ComplexArray,
-) -> ComplexArray:
-    """Deck's complex amplitudes (K, 6): bilinear in frequency and heading, the ends held beyond the grid."""
-    response = np.empty((frequency.shape[0], 6), dtype=np.complex128)
-    for k in range(frequency.shape[0]):
-        i = min(max(np.searchsorted(grid_frequency, frequency[k]) - 1, 0), grid_frequency.shape[0] - 2)
-        u = (frequency[k] - grid_frequency[i]) / (grid_frequency[i + 1] - grid_frequency[i])
-        u = min(max(u, 0.0), 1.0)
-        angle = direction[k] % (2.0 * math.pi)
-        j = min(max(np.searchsorted(grid_heading, angle) - 1, 0), grid_heading.shape[0] - 2)
-        v = (angle - grid_heading[j]) / (grid_heading[j + 1] - grid_heading[j])
-        wave = amplitude[k] * complex(math.cos(phase[k]), math.sin(phase[k]))
-        for d in range(6):
-            low = (1.0 - v) * table[i, j, d] + v * table[i, j + 1, d]
-            high = (1.0 - v) * table[i + 1, j, d] + v * table[i + 1, j + 1, d]
-            response[k, d] = wave * ((1.0 - u) * low + u * high)
-    return response
+    return _SeaKernels(realise, respond_to)

@@ -133,6 +133,34 @@ def charge_parted(row: Any, episode_duration: float, lanes: int, j: int) -> None
             row[at.OMEGA2 * lanes + j] = peak
 
 
+@scalar
+def read_out(row: Any, lanes: int, j: int, state: Any, results: Any, i: int) -> None:
+    """Copy what is known of lane j into line i of state (N, 14) and results (N, RESULTS)."""
+    state[i, 0] = row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j]
+    state[i, 1] = row[(at.LOAD_VELOCITY + 2) * lanes + j]
+    state[i, 2] = row[at.LOAD_POSITION * lanes + j] - row[at.PULLEY * lanes + j]
+    state[i, 3] = row[(at.LOAD_POSITION + 1) * lanes + j] - row[(at.PULLEY + 1) * lanes + j]
+    state[i, 4] = row[at.LOAD_VELOCITY * lanes + j]
+    state[i, 5] = row[(at.LOAD_VELOCITY + 1) * lanes + j]
+    state[i, 6] = row[(at.PULLEY + 2) * lanes + j] - row[(at.PULLEY_ON_DECK + 2) * lanes + j]
+    state[i, 7] = row[(at.PULLEY + 5) * lanes + j]
+    state[i, 8] = row[(at.PULLEY + 8) * lanes + j]
+    state[i, 9] = row[at.DRUM_ANGLE * lanes + j]
+    state[i, 10] = row[at.DRUM_SPEED * lanes + j]
+    state[i, 11] = row[at.TENSION * lanes + j]
+    state[i, 12] = row[at.MASS * lanes + j]
+    state[i, 13] = row[at.FREE_LENGTH * lanes + j] + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
+    results[i, TIME] = row[at.TIME * lanes + j]
+    for k in range(3):
+        results[i, LOAD + k] = row[(at.LOAD_POSITION + k) * lanes + j]
+    results[i, TENSION] = row[at.TENSION * lanes + j]
+    results[i, SLACK] = row[at.SLACK * lanes + j]
+    results[i, OMEGA1] = row[at.OMEGA1 * lanes + j]
+    results[i, OMEGA2] = row[at.OMEGA2 * lanes + j]
+    results[i, COST] = row[at.STEP_COST * lanes + j]
+    results[i, PARTED] = row[at.PARTED * lanes + j]
+
+
 @cache
 def report_kernel(lanes: int) -> Callable[..., None]:
     """Kernel (blocks, episode duration, state (N, 14), results (N, RESULTS)) that reads the rows out."""
@@ -140,46 +168,26 @@ def report_kernel(lanes: int) -> Callable[..., None]:
     @kernel
     def report(blocks, episode_duration, state, results):  # type: ignore[no-untyped-def]
         for i in range(state.shape[0]):
-            row = blocks[i // lanes]
-            j = i % lanes
-            charge_parted(row, episode_duration, lanes, j)
-            state[i, 0] = row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j]
-            state[i, 1] = row[(at.LOAD_VELOCITY + 2) * lanes + j]
-            state[i, 2] = row[at.LOAD_POSITION * lanes + j] - row[at.PULLEY * lanes + j]
-            state[i, 3] = row[(at.LOAD_POSITION + 1) * lanes + j] - row[(at.PULLEY + 1) * lanes + j]
-            state[i, 4] = row[at.LOAD_VELOCITY * lanes + j]
-            state[i, 5] = row[(at.LOAD_VELOCITY + 1) * lanes + j]
-            state[i, 6] = row[(at.PULLEY + 2) * lanes + j] - row[(at.PULLEY_ON_DECK + 2) * lanes + j]
-            state[i, 7] = row[(at.PULLEY + 5) * lanes + j]
-            state[i, 8] = row[(at.PULLEY + 8) * lanes + j]
-            state[i, 9] = row[at.DRUM_ANGLE * lanes + j]
-            state[i, 10] = row[at.DRUM_SPEED * lanes + j]
-            state[i, 11] = row[at.TENSION * lanes + j]
-            state[i, 12] = row[at.MASS * lanes + j]
-            state[i, 13] = (
-                row[at.FREE_LENGTH * lanes + j] + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
-            )
-            results[i, TIME] = row[at.TIME * lanes + j]
-            for k in range(3):
-                results[i, LOAD + k] = row[(at.LOAD_POSITION + k) * lanes + j]
-            results[i, TENSION] = row[at.TENSION * lanes + j]
-            results[i, SLACK] = row[at.SLACK * lanes + j]
-            results[i, OMEGA1] = row[at.OMEGA1 * lanes + j]
-            results[i, OMEGA2] = row[at.OMEGA2 * lanes + j]
-            results[i, COST] = row[at.STEP_COST * lanes + j]
-            results[i, PARTED] = row[at.PARTED * lanes + j]
+            charge_parted(blocks[i // lanes], episode_duration, lanes, i % lanes)
+            read_out(blocks[i // lanes], lanes, i % lanes, state, results, i)
 
     return report
+
+
+@scalar
+def clip_row(values: Any, low: Any, high: Any, observation: Any, i: int) -> None:
+    """Round line i of values (N, K) float64 into an observation (N, K) float32, within low and high (K,) float32."""
+    for k in range(values.shape[1]):
+        value = np.float32(values[i, k])
+        value = low[k] if value < low[k] else value
+        observation[i, k] = high[k] if value > high[k] else value
 
 
 @kernel
 def clip(values: Any, low: Any, high: Any, observation: Any) -> None:
     """Round values (N, K) float64 into an observation (N, K) float32, within low and high (K,) float32."""
     for i in range(values.shape[0]):
-        for k in range(values.shape[1]):
-            value = np.float32(values[i, k])
-            value = low[k] if value < low[k] else value
-            observation[i, k] = high[k] if value > high[k] else value
+        clip_row(values, low, high, observation, i)
 
 
 def frame_info(frames: npt.NDArray[np.float64]) -> dict[str, Any]:

@@ -8,7 +8,8 @@ to move meanwhile: with an output of zero the drum only follows the pulley.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -84,15 +85,8 @@ class StateFeatures:
     def _look(self, o: Columns, rows: Rows) -> Float32Array:
         lifts = self._lifts
         lifts.winch.speed[rows] = o["drum_speed"]
-        step = lifts.period
-        self._rise[rows] = step * (o["pulley_velocity_z"] + 0.5 * step * o["pulley_acceleration_z"])
-        return _stacked(
-            *_of_the_load(o["depth_error"], o["load_velocity_z"], lifts.stretch(o, rows)),
-            10.0 * (o["pulley_velocity_z"] - lifts.winch.radius[rows] * o["drum_speed"]),
-            o["pulley_velocity_z"],
-            o["pulley_acceleration_z"],
-            *_of_the_lift(o, lifts, rows),
-        )
+        self._rise[rows] = coming_rise(o, lifts.period)
+        return _stacked(*of_the_state(np, o, lifts.winch.radius[rows], lifts.stretch(o, rows), lifts.frequency[rows]))
 
 
 class SensedFeatures:
@@ -137,13 +131,13 @@ class SensedFeatures:
         velocity = self._observer.pulley_velocity(3)[:, rows]
         soon, later = np.diff(velocity, axis=0) / lifts.period
         return _stacked(
-            *_of_the_load(depth_error, load_velocity, rope_end - depth_error),
+            *_of_the_load(np, depth_error, load_velocity, rope_end - depth_error),
             10.0 * rope_end_speed,
             velocity[0],
             self._pulley.rate(rows) + self._ahead * self._pulley.bend(rows),
             soon,
             later,
-            *_of_the_lift(o, lifts, rows),
+            *_of_the_lift(o, lifts.frequency[rows]),
         )
 
 
@@ -157,21 +151,49 @@ def features_for(rows: int, control_period: float, sensors: Sensors | None) -> F
 
 def _turn(rise: FloatArray, output: FloatArray, lifts: Lifts) -> FloatArray:
     winch = lifts.winch
-    up = AUTHORITY * winch.max_acceleration * winch.radius * np.clip(output, -1.0, 1.0)
-    return np.asarray((rise - lifts.period * up) / winch.radius)
+    return np.asarray(wanted_turn(np, rise, output, winch.radius, winch.max_acceleration, lifts.period))
 
 
-def _of_the_load(depth_error: FloatArray, velocity: FloatArray, stretch: FloatArray) -> tuple[FloatArray, ...]:
+# For arrays of numpy (``xp`` = numpy) and tensors of torch (``xp`` = torch) alike, all (N,).
+
+
+def of_the_state(xp: Any, o: Mapping[str, Any], radius: Any, stretch: Any, frequency: Any) -> tuple[Any, ...]:
+    """STATE_FEATURES, not clipped yet, of full states ``o``, by the names of their quantities.
+
+    The drums' ``radius``, m; ``stretch`` of the ropes beyond that under the loads' weight, m; ``frequency`` of the
+    loads' bobbing, rad/s.
+    """
+    return (
+        *_of_the_load(xp, o["depth_error"], o["load_velocity_z"], stretch),
+        10.0 * (o["pulley_velocity_z"] - radius * o["drum_speed"]),
+        o["pulley_velocity_z"],
+        o["pulley_acceleration_z"],
+        *_of_the_lift(o, frequency),
+    )
+
+
+def coming_rise(o: Mapping[str, Any], period: float) -> Any:
+    """Rise of the pulleys during a coming control step of ``period`` s, m, as the full state tells."""
+    return period * (o["pulley_velocity_z"] + 0.5 * period * o["pulley_acceleration_z"])
+
+
+def wanted_turn(xp: Any, rise: Any, output: Any, radius: Any, max_acceleration: Any, period: float) -> Any:
+    """How far the drums are to turn, rad, while the pulleys ``rise`` m, for a network's ``output`` in [-1, 1]."""
+    up = AUTHORITY * max_acceleration * radius * xp.clip(output, -1.0, 1.0)
+    return (rise - period * up) / radius
+
+
+def _of_the_load(xp: Any, depth_error: Any, velocity: Any, stretch: Any) -> tuple[Any, ...]:
     # Beyond some metres only the side of the error: there the agent does what it has learned nearer.
-    return 4.0 * np.tanh(0.5 * depth_error), 2.0 * np.tanh(10.0 * depth_error), 5.0 * velocity, 20.0 * stretch
+    return 4.0 * xp.tanh(0.5 * depth_error), 2.0 * xp.tanh(10.0 * depth_error), 5.0 * velocity, 20.0 * stretch
 
 
-def _of_the_lift(o: Columns, lifts: Lifts, rows: Rows) -> tuple[FloatArray, ...]:
+def _of_the_lift(o: Mapping[str, Any], frequency: Any) -> tuple[Any, ...]:
     return (
         0.5 * o["pulley_heave"],
         o["load_mass"] / 5.0e4 - 1.2,
         o["rope_length"] / 1.0e3 - 0.8,
-        0.25 * lifts.frequency[rows] - 1.0,
+        0.25 * frequency - 1.0,
     )
 
 

@@ -23,7 +23,28 @@ from aframe_env.scenario import ScenarioSource
 from aframe_env.simulation import Simulation
 from agents.features import LIMIT, STATE_FEATURES, StateFeatures, features_for
 
+FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
+
+
+def shaped(xp: Any, mean_square: Any, scale: float, knee: float) -> Any:
+    """Rewards (N,) for mean squares of the depth error (N,) m², arrays of ``xp`` = numpy or torch.
+
+    ``scale``: of a metre of root mean square; ``knee`` [m]: beyond it the reward falls with the logarithm only.
+    """
+    rms = xp.sqrt(xp.clip(mean_square, None, 1e4))
+    return -scale * (knee * xp.log1p(rms / knee) if math.isfinite(knee) else rms)
+
+
+def median_reduction(error_sum: FloatArray, still_sum: FloatArray) -> float:
+    """Median over N rows of the heave reduction.
+
+    Integrals (N,) m² s over the same time: of the squared depth error, and of the pulley's squared heave, which stands
+    for what the load of a still drum would do.
+    """
+    moved = still_sum > 0.0
+    left = np.sqrt(error_sum[moved] / still_sum[moved])
+    return 1.0 - float(np.median(left)) if len(left) else 0.0
 
 
 class TrainingVecEnv(VecEnv):
@@ -84,14 +105,10 @@ class TrainingVecEnv(VecEnv):
         return self._simulation.quantities
 
     def take_reduction(self) -> float:
-        """Median over the rows of the heave reduction since the last call, exploration included.
-
-        The pulley's heave stands for what the load of a still drum would do.
-        """
-        moved = self._still_sum > 0.0
-        left = np.sqrt(self._error_sum[moved] / self._still_sum[moved])
+        """Median over the rows of the heave reduction since the last call, exploration included."""
+        reduction = median_reduction(self._error_sum, self._still_sum)
         self._error_sum[:] = self._still_sum[:] = 0.0
-        return 1.0 - float(np.median(left)) if len(left) else 0.0
+        return reduction
 
     def reset(self) -> Float32Array:
         """Start all rows at random times of their horizon, so that they do not all end at once."""
@@ -110,10 +127,7 @@ class TrainingVecEnv(VecEnv):
         cost = simulation.results[:, task.COST]
         self._error_sum += cost
         self._still_sum += np.square(simulation.state[:, 6]) * simulation.control_period
-        rms = np.sqrt(np.minimum(cost / simulation.control_period, 1e4))
-        if math.isfinite(self._reward_knee):
-            rms = self._reward_knee * np.log1p(rms / self._reward_knee)
-        rewards = -self._reward_scale * rms
+        rewards = shaped(np, cost / simulation.control_period, self._reward_scale, self._reward_knee)
         self._return += rewards
         self._length += 1
         self._left -= 1

@@ -10,15 +10,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 import torch
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import configure
+from stable_baselines3.common.logger import Logger, configure
 
+from aframe_env import task
 from aframe_env.sensors import Sensors
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
 from agents.features import feature_names
@@ -100,13 +100,51 @@ class LearningOptions:
         return self.learning_rate * max(remaining, 1.0 / 30.0)
 
 
+class Model(Protocol):
+    """What is needed of a learner of Stable-Baselines3, or of another that does the same."""
+
+    num_timesteps: int
+
+    @property
+    def logger(self) -> Logger:
+        """Where figures go."""
+        ...
+
+    def set_logger(self, logger: Logger) -> None:
+        """Say where figures go."""
+        ...
+
+    def learn(self, total_timesteps: int, callback: BaseCallback | None = None) -> object:
+        """Learn from so many control steps, over all rows."""
+        ...
+
+
+class Rows(Protocol):
+    """What is needed of a learner's rows."""
+
+    num_envs: int
+
+    @property
+    def quantities(self) -> tuple[task.Quantity, ...]:
+        """What an observation of the environment consists of."""
+        ...
+
+    def reset(self) -> object:
+        """Start all rows."""
+        ...
+
+    def take_reduction(self) -> float:
+        """Heave reduction over all steps since the last call."""
+        ...
+
+
 @dataclass(frozen=True)
 class Learner:
-    """A learner of Stable-Baselines3, its rows, and how to take the agent out of it."""
+    """A learner, its rows, and how to take the agent out of it."""
 
     algorithm: str
-    model: BaseAlgorithm
-    rows: TrainingVecEnv
+    model: Model
+    rows: Rows
     to_actor: Callable[[], Actor]
 
 
@@ -130,7 +168,7 @@ def make_rows(options: LearningOptions) -> TrainingVecEnv:
 class ShowReduction(BaseCallback):
     """Show progress and heave reduction while learning."""
 
-    def __init__(self, progress: Progress, total: int, rows: TrainingVecEnv) -> None:
+    def __init__(self, progress: Progress, total: int, rows: Rows) -> None:
         super().__init__()
         self._progress = progress
         self._task = progress.add_task("learning", total=total, reduction="   -  ")

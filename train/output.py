@@ -13,6 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from gymnasium.error import DependencyNotInstalled
 from llvmlite.binding import get_host_cpu_name
 
 from aframe_env.validation import InvalidValue
@@ -76,12 +77,12 @@ def versions() -> dict[str, str]:
 
 @contextlib.contextmanager
 def user_errors() -> Iterator[None]:
-    """Turn bad input and a failing disk into one line on standard error and exit status 2, Ctrl-C into status 130."""
+    """One line on standard error for bad input, a failing disk and a missing extra (status 2) and Ctrl-C (130)."""
     try:
         yield
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         raise SystemExit(130) from None
-    except (InvalidValue, OSError) as error:
+    except (InvalidValue, OSError, DependencyNotInstalled) as error:
         print(f"error: {error}", file=sys.stderr)
         raise SystemExit(2) from None

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import njit, types
-from numba.core import event
+from numba.core import config, event
 from numba.extending import intrinsic
 
 _LOGGER = logging.getLogger("aframe_env")
@@ -104,9 +104,6 @@ def _fused(typing_context, a, b, c):  # type: ignore[no-untyped-def]
     return types.float64(a, b, c), generate
 
 
-_fused_multiply_add: Any = intrinsic(_fused)
-
-
 def _selected(typing_context, condition, a, b):  # type: ignore[no-untyped-def]
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         return builder.select(*arguments)
@@ -114,7 +111,17 @@ def _selected(typing_context, condition, a, b):  # type: ignore[no-untyped-def]
     return types.float64(types.boolean, types.float64, types.float64), generate
 
 
-_select_value: Any = intrinsic(_selected)
+def _rounded_twice(a: float, b: float, c: float) -> float:
+    return a * b + c
+
+
+def _chosen(condition: bool, a: float, b: float) -> float:
+    return a if condition else b
+
+
+# In numba's CUDA simulator all of it runs as plain Python, which has no fma before 3.13.
+_fused_multiply_add: Any = _rounded_twice if config.DISABLE_JIT else intrinsic(_fused)
+_select_value: Any = _chosen if config.DISABLE_JIT else intrinsic(_selected)
 
 
 @scalar

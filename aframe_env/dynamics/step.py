@@ -73,9 +73,7 @@ def begin_load(row: Array, span: Span) -> None:
     lanes = span.stride
     for j in range(span.begin, span.end):
         row[at.INVERSE_MASS * lanes + j] = 1.0 / row[at.MASS * lanes + j]
-        length = fma(
-            row[at.DRUM_RADIUS * lanes + j], row[at.DRUM_ANGLE * lanes + j], row[at.FREE_LENGTH * lanes + j]
-        )
+        length = fma(row[at.DRUM_RADIUS * lanes + j], row[at.DRUM_ANGLE * lanes + j], row[at.FREE_LENGTH * lanes + j])
         row[at.STIFFNESS * lanes + j] = row[at.AXIAL_STIFFNESS * lanes + j] / length
 
 

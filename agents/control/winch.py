@@ -71,20 +71,27 @@ def _advance(command: float, speed: float, acceleration: float, lag: float, peri
     return drum_state(period, 0.0, speed, command, acceleration, lag, way, ramp, error, end, -math.inf, math.inf)
 
 
+@scalar
+def command_for(turn: float, speed: float, limit: float, acceleration: float, lag: float, period: float) -> float:
+    """Command [rad/s] within ± ``limit`` that turns the drum by ``turn`` [rad] in a control step, or nearly so."""
+    low, high = -limit, limit
+    middle = 0.0
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        angle, _speed = _advance(middle, speed, acceleration, lag, period)
+        if angle < turn:
+            low = middle
+        else:
+            high = middle
+    return middle
+
+
 @cache
 def _kernels() -> _Kernels:
     @kernel
     def invert(speed, limit, acceleration, lag, period, turn, command):  # type: ignore[no-untyped-def]
         for i in range(turn.shape[0]):
-            low, high = -limit[i], limit[i]
-            for _ in range(_BISECTIONS):
-                middle = 0.5 * (low + high)
-                angle, _speed = _advance(middle, speed[i], acceleration[i], lag[i], period)
-                if angle < turn[i]:
-                    low = middle
-                else:
-                    high = middle
-            command[i] = middle
+            command[i] = command_for(turn[i], speed[i], limit[i], acceleration[i], lag[i], period)
 
     @kernel
     def follow(speed, acceleration, lag, period, command, turned):  # type: ignore[no-untyped-def]
