@@ -19,25 +19,19 @@ from train.output import user_errors
 
 @dataclass(frozen=True, kw_only=True)
 class Options(LearningOptions):
-    """Options of the training; the defaults are what led a search by ``python -m train.tune``, rounded."""
+    """Options of the training."""
 
     device: Literal["cpu", "cuda"] = "cpu"
     """cuda: environment and learner on the GPU (extra ``cuda``), with defaults of their own: see ``train.gpu_ppo``."""
-    learning_rate: float = 8e-4
-    """At the start; it falls linearly to a thirtieth."""
-    gamma: float = 0.9
-    """Discount for a control step: a horizon of one second."""
-    reward_knee: float = 0.016
-    """Depth error beyond which the reward falls with its logarithm only, m."""
     n_steps: int = 64
     """Steps of each row between two updates."""
-    n_epochs: int = 15
+    n_epochs: int = 10
     """Passes over the data of an update."""
-    gae_lambda: float = 0.87
+    gae_lambda: float = 0.9
     """λ of the generalised advantage estimate."""
-    clip_range: float = 0.35
+    clip_range: float = 0.2
     """PPO's clipping."""
-    log_std_init: float = -2.5
+    log_std_init: float = -1.5
     """Logarithm of the first standard deviation of an action."""
 
     def __post_init__(self) -> None:
