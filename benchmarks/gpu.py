@@ -127,10 +127,7 @@ def learn(target: float, options: Options, chosen: gpu_ppo.Options) -> learner.O
     built = gpu_ppo.build(chosen)
     limits = learner.Options(target=target, scenarios=options.scenarios, limit=options.limit)
     clock = learner.Clock(lambda: to_policy(built, chosen)[0], limits)
-    built.model.learn(chosen.timesteps, callback=clock)
-    return learner.Outcome(
-        "this package", chosen.seed, clock.reached, clock.seconds, built.model.num_timesteps, clock.reductions
-    )
+    return learner.watch("this package", chosen.seed, built.model, chosen.timesteps, clock)
 
 
 def run(options: Options, device: torch.device, chosen: gpu_ppo.Options, console: Console) -> None:

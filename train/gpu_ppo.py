@@ -90,7 +90,7 @@ class RslPPO:
 
     def __init__(self, rows: TrainingRows, options: Options) -> None:
         self.num_timesteps = 0
-        self._rows, self._options = rows, options
+        self.env, self._options = rows, options
         self._logger: Logger | None = None
         observations = rows.get_observations()
         inputs, hidden = observations[GROUP].shape[1], options.hidden
@@ -132,7 +132,7 @@ class RslPPO:
     def learn(self, total_timesteps: int, callback: BaseCallback | None = None) -> None:
         """Learn from so many control steps, over all rows."""
         begin = time.perf_counter()
-        observations = self._rows.get_observations()
+        observations = self.env.get_observations()
         if callback:
             callback.init_callback(self)  # type: ignore[arg-type]
             callback.on_training_start({}, {})
@@ -142,19 +142,24 @@ class RslPPO:
                 callback.on_rollout_start()
             with torch.inference_mode():
                 for _ in range(self._options.n_steps):
-                    observations, rewards, dones, extras = self._rows.step(self._learner.act(observations))
+                    observations, rewards, dones, extras = self.env.step(self._learner.act(observations))
                     self._learner.process_env_step(observations, rewards, dones, extras)
-                    self.num_timesteps += self._rows.num_envs
+                    self.num_timesteps += self.env.num_envs
                     if callback and not callback.on_step():
                         return
                 self._learner.compute_returns(observations)
             if callback:
                 callback.on_rollout_end()
-            losses = self._learner.update()
+            losses = self.train()
             if self._logger:
                 self._record(losses, time.perf_counter() - begin)
         if callback:
             callback.on_training_end()
+
+    def train(self) -> Mapping[str, float]:
+        """Update the networks from what was collected; return the losses."""
+        losses: Mapping[str, float] = self._learner.update()
+        return losses
 
     def to_actor(self) -> Actor:
         """Return the mean action as a plain network of its own, on the processor."""

@@ -44,7 +44,7 @@ class Options(LearningOptions):
         super().__post_init__()
         require_choice("device", self.device, ("cpu", "cuda"))
         require_integer("n_steps", self.n_steps, low=2, high=10**6)
-        if self.device == "cpu":  # the defaults of the other may be others
+        if self.device == "cpu":  # for "cuda" they are read anew, with the defaults of train.gpu_ppo
             require_integer("batch_size", self.batch_size, low=2, high=self.n_steps * self.n_envs)
         require_integer("n_epochs", self.n_epochs, low=1, high=1000)
         require_number("gae_lambda", self.gae_lambda, "", low=0.0, high=1.0)

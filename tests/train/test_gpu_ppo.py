@@ -109,20 +109,6 @@ def test_the_agent_is_the_learner_s_mean_action() -> None:
     torch.testing.assert_close(output, torch.clip(mean, -1.0, 1.0))
 
 
-def test_it_learns() -> None:
-    """Some ten thousand steps are enough to be better than at the start."""
-    options = Options(
-        device="cpu", n_envs=128, n_steps=16, batch_size=512, n_epochs=5, timesteps=40_000, learning_rate=3e-3
-    )
-    learner = gpu_ppo.build(options)
-    learner.rows.take_reduction()
-    learner.model.learn(options.timesteps // 4)
-    before = learner.rows.take_reduction()
-    learner.model.learn(options.timesteps)
-    after = learner.rows.take_reduction()
-    assert after > before
-
-
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a CUDA device")
 def test_cuda_without_a_device_is_one_clear_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
