@@ -43,9 +43,9 @@ def comparison_figure(path: Path, entries: Sequence[Entry], still: Episodes) -> 
         width = 2.0 if entry.policy in first.values() else 0.7
         profile.step(left, share, style, where="post", color=colour[_kind(entry)], lw=width)
     profile.set_xscale("log")
-    profile.set_xlim(3.0, 1e-3)
-    ticks = [1.0, 0.5, 0.1, 0.05, 0.01, 0.002]
-    profile.set_xticks(ticks, [f"{1 - t:.1%}".replace(".0%", "%") for t in ticks])
+    profile.set_xlim(3.0, 2e-4)
+    ticks = [1.0, 0.5, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003]
+    profile.set_xticks(ticks, [f"{100 * (1 - t):.4g}%" for t in ticks])
     profile.minorticks_off()
     profile.set_xlabel("heave reduction 1 − RMS / RMS(drum still)")
     profile.set_ylabel("share of scenarios with at least this reduction")
