@@ -19,13 +19,14 @@ results: .venv/installed-test
 	$(BIN)/python -m train.ppo --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/ppo
 	$(BIN)/python -m train.ppo --observation sensors --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/ppo-sensors
 	$(BIN)/python -m train.sac --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/sac
+	$(BIN)/python -m train.sac --observation sensors --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/sac-sensors
 	$(BIN)/python -m train.tune_control --scenarios 200 --evaluations 24 --overwrite --out results/control
 	$(BIN)/python -m train.drives --case paper --check rfem --overwrite --out results/drives-paper
 	$(BIN)/python -m train.drive_map --overwrite --out results/drive-map
 	$(BIN)/python -m train.optimisers --overwrite --out results/optimisers
 	$(BIN)/python -m train.evaluate --scenarios 1000 --overwrite --out results/comparison
 	$(BIN)/python -m train.evaluate --model rfem --privileged 0 --overwrite --out results/comparison-full-model --policies \
-		results/agents/ppo results/agents/sac results/agents/ppo-sensors \
+		results/agents/ppo results/agents/sac results/agents/ppo-sensors results/agents/sac-sensors \
 		"feed-forward + feedback (state)" "feed-forward + feedback"
 	$(BIN)/python -m train.sensitivity --overwrite --out results/sensitivity
 	$(BIN)/python -m train.verify

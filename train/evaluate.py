@@ -34,6 +34,7 @@ class Options(HeldOut):
         "results/agents/ppo",
         "results/agents/sac",
         "results/agents/ppo-sensors",
+        "results/agents/sac-sensors",
         "results/drive-map",
         *AFTER_TRAINING,
         "predictive control",

@@ -19,19 +19,25 @@ from train.output import user_errors
 
 @dataclass(frozen=True, kw_only=True)
 class Options(LearningOptions):
-    """Options of the training."""
+    """Options of the training; the defaults are a trial of results/tune-ppo, rounded."""
 
     device: Literal["cpu", "cuda"] = "cpu"
     """cuda: environment and learner on the GPU (extra ``cuda``), with defaults of their own: see ``train.gpu_ppo``."""
-    n_steps: int = 64
+    batch_size: int = 2048
+    """Minibatch."""
+    learning_rate: float = 1.8e-3
+    """At the start; it falls linearly to a thirtieth."""
+    gamma: float = 0.94
+    """Discount for a control step: a horizon of 1.6 seconds."""
+    n_steps: int = 128
     """Steps of each row between two updates."""
     n_epochs: int = 10
     """Passes over the data of an update."""
-    gae_lambda: float = 0.9
+    gae_lambda: float = 0.97
     """λ of the generalised advantage estimate."""
-    clip_range: float = 0.2
+    clip_range: float = 0.3
     """PPO's clipping."""
-    log_std_init: float = -1.5
+    log_std_init: float = -1.65
     """Logarithm of the first standard deviation of an action."""
 
     def __post_init__(self) -> None:

@@ -50,6 +50,7 @@ class Options:
         "results/agents/ppo",
         "results/agents/sac",
         "results/agents/ppo-sensors",
+        "results/agents/sac-sensors",
     )
     """"drum still", "S-Ω1", "S-Ω2", "H-Ω1", "H-Ω2", "drive map", or the folder of an agent."""
     scenarios: int = 8
