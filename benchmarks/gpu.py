@@ -74,6 +74,20 @@ class Speed:
     """Memory of the device a row, at its most; None on the processor."""
 
 
+@dataclass(frozen=True)
+class Learned:
+    """One run of the learner."""
+
+    target: float
+    """Median heave reduction to reach."""
+    reached: bool
+    seconds: float
+    """Learning until the target, or until given up."""
+    timesteps: int
+    reductions: list[float]
+    """Median heave reduction at each look."""
+
+
 def finish(device: torch.device) -> float:
     """Wait for the device; s of a clock."""
     if device.type == "cuda":
@@ -122,12 +136,13 @@ def measure(rows: int, options: Options, device: torch.device, bandwidth: float)
     return Speed(rows, samples, share, most)
 
 
-def learn(target: float, options: Options, chosen: gpu_ppo.Options) -> learner.Outcome:
+def learn(target: float, options: Options, chosen: gpu_ppo.Options) -> Learned:
     """Learn until the target; the clock stands still while it is looked at."""
     built = gpu_ppo.build(chosen)
     limits = learner.Options(target=target, scenarios=options.scenarios, limit=options.limit)
     clock = learner.Clock(lambda: to_policy(built, chosen)[0], limits)
-    return learner.watch("this package", chosen.seed, built.model, chosen.timesteps, clock)
+    built.model.learn(chosen.timesteps, callback=clock)
+    return Learned(target, clock.reached, clock.seconds, built.model.num_timesteps, clock.reductions)
 
 
 def run(options: Options, device: torch.device, chosen: gpu_ppo.Options, console: Console) -> None:
@@ -140,19 +155,18 @@ def run(options: Options, device: torch.device, chosen: gpu_ppo.Options, console
         speeds.append(measure(rows, options, device, bandwidth))
         median, share = np.median(speeds[-1].steps_per_second), speeds[-1].bandwidth_share
         console.print(f"{rows:,} rows: {median:,.0f} env steps/s, {share:.1%} of the copy bandwidth")
-    outcomes = []
+    runs = []
     for target in options.targets:
-        outcome = learn(target, options, chosen)
-        outcomes.append({"target": target, **vars(outcome)})
-        end = f"{outcome.seconds:.1f} s" if outcome.reached else "given up"
-        console.print(f"{target:.0%} heave reduction: {end}, {outcome.timesteps:,} steps")
+        runs.append(learn(target, options, chosen))
+        end = f"{runs[-1].seconds:.1f} s" if runs[-1].reached else "given up"
+        console.print(f"{target:.0%} heave reduction: {end}, {runs[-1].timesteps:,} steps")
     write_json(
         options.out,
         {
             "device": name,
             "copy_bytes_per_second": bandwidth,
             "speeds": [asdict(speed) for speed in speeds],
-            "learning": outcomes,
+            "learning": [asdict(one) for one in runs],
             "versions": versions(),
         },
     )

@@ -144,7 +144,7 @@ class Clock(BaseCallback):
 
 
 def watch(setup: Setup, seed: int, model: BaseAlgorithm, timesteps: int, clock: Clock) -> Outcome:
-    """Learn until the clock says so; where the device works on while the clock is read, the shares mean little."""
+    """Learn until the clock says so."""
     environment, updates = Stopwatch(model.env, "step"), Stopwatch(model, "train")
     model.learn(timesteps, callback=clock)
     return Outcome(

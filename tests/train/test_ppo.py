@@ -69,7 +69,7 @@ def test_ctrl_c_keeps_what_was_learned(tmp_path, monkeypatch):
     [
         (("--n-envs", 0), "n_envs = 0: must be in [1, 1048576]"),
         (("--learning-rate", "nan"), "learning_rate = nan"),
-        (("--batch-size", 10**9), "batch_size = 1000000000: must be in [2, 4096]"),
+        (("--batch-size", 10**9), "batch_size = 1000000000: must be in [2, 8192]"),
         (("--horizon", -1), "horizon = -1.0 s: must be in [0.1, 60] s"),
         (("--config", "absent.toml"), "cannot be read"),
     ],
