@@ -85,6 +85,7 @@ class Simulation:
         self.action_space = spaces.Box(-limit, limit, (1,), np.float32)
         self.scenarios: list[Scenario | None] = [None] * rows
         self.steps = np.zeros(rows, dtype=np.int64)
+        self._everything = np.arange(rows)
         self.state = np.zeros((rows, len(task.STATE)))
         self.results = np.zeros((rows, task.RESULTS))
         self._warned = False
@@ -130,7 +131,7 @@ class Simulation:
             self._engine.reset_row(index, scenario)
             self.scenarios[index] = scenario
         self.steps[indices] = 0
-        self._read_out()
+        self._read_out(indices)
         if self._bank is not None:
             truth = self._sensed_truth()
             for index, (_, noise_seed) in zip(indices.tolist(), drawn, strict=True):
@@ -140,7 +141,7 @@ class Simulation:
         """Advance every row by one control step; ``commands`` (rows,) rad/s, finite."""
         self._engine.step(commands)
         self.steps += 1
-        self._read_out()
+        self._read_out(self._everything)
         if self._bank is not None:
             self._bank.measure(self._sensed_truth())
 
@@ -174,10 +175,10 @@ class Simulation:
         self.steps[index] = state.step
         if self._bank is not None and state.sensors is not None:
             self._bank.write_row(index, state.sensors)
-        self._read_out()
+        self._read_out(np.array([index]))
 
-    def _read_out(self) -> None:
-        self._report(self._engine.blocks, self.episode_duration, self.state, self.results)
+    def _read_out(self, rows: npt.NDArray[np.int64]) -> None:
+        self._report(self._engine.blocks, self.episode_duration, rows, self.state, self.results)
 
     def _known(self) -> FloatArray:
         """What the operator knows before the lift: mass and nominal unstretched rope length, (rows, 2)."""

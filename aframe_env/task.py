@@ -163,11 +163,11 @@ def read_out(row: Any, lanes: int, j: int, state: Any, results: Any, i: int) -> 
 
 @cache
 def report_kernel(lanes: int) -> Callable[..., None]:
-    """Kernel (blocks, episode duration, state (N, 14), results (N, RESULTS)) that reads the rows out."""
+    """Kernel (blocks, episode duration, rows (n,), state (N, 14), results (N, RESULTS)) that reads rows out."""
 
     @kernel
-    def report(blocks, episode_duration, state, results):  # type: ignore[no-untyped-def]
-        for i in range(state.shape[0]):
+    def report(blocks, episode_duration, rows, state, results):  # type: ignore[no-untyped-def]
+        for i in rows:
             charge_parted(blocks[i // lanes], episode_duration, lanes, i % lanes)
             read_out(blocks[i // lanes], lanes, i % lanes, state, results, i)
 
