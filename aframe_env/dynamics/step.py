@@ -153,6 +153,8 @@ def inner_step(row: Array, index: int, span: Span) -> None:
         row[(at.PULLEY + 4) * lanes + j] = d2
         row[(at.PULLEY + 5) * lanes + j] = d3
         row[at.STEP_COST * lanes + j] += cost
+        # What is never negative is taken by its magnitude, PARTED through its complement: these are the same numbers,
+        # but the compiler would see that a store changes nothing and leave it out in some lanes, as in ``select``.
         row[at.OMEGA2 * lanes + j] = larger(abs(x3 - target), abs(row[at.OMEGA2 * lanes + j]))
         # A lane that stands still has met its pulley and drum beyond the segment: what it felt there is no tension.
         slack = active & (peak <= 0.0)
