@@ -262,14 +262,14 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         return seed
 
     def _infos(self, mask: Rows) -> dict[str, Any]:
-        results = self._simulation.results
+        results = self._simulation.results.copy()
         values: dict[str, Any] = {
-            "time": results[:, task.TIME].copy(),
-            "load_position": results[:, task.LOAD : task.LOAD + 3].copy(),
-            "rope_tension": results[:, task.TENSION].copy(),
+            "time": results[:, task.TIME],
+            "load_position": results[:, task.LOAD : task.LOAD + 3],
+            "rope_tension": results[:, task.TENSION],
             "slack": results[:, task.SLACK] > 0.0,
-            "omega1": results[:, task.OMEGA1].copy(),
-            "omega2": results[:, task.OMEGA2].copy(),
+            "omega1": results[:, task.OMEGA1],
+            "omega2": results[:, task.OMEGA2],
         }
         frames = self._simulation.frames()
         if frames is not None:
