@@ -10,14 +10,16 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
+from aframe_env.dynamics.blocks import three
 from aframe_env.dynamics.compiling import kernel, scalar
-from aframe_env.dynamics.integrator import rk4_step
+from aframe_env.dynamics.load import Load, RopeEnd, load_constants, rk4_step
+from aframe_env.dynamics.vector import Vector
 from aframe_env.engine import Engine
 from aframe_env.motion import require_coverage
 from aframe_env.scenario import Scenario
@@ -65,28 +67,33 @@ def coarse_step(scenario: Scenario) -> float:
     return min(COARSE_STEP, COARSE_PHASE / scenario.rope_frequency)
 
 
+class _Drum(NamedTuple):
+    """What turns a drum angle into a rope."""
+
+    radius: float
+    """m."""
+    free_length: float
+    """l_0, m."""
+    axial_stiffness: float
+    """E_R F_R, N."""
+
+
 @scalar
-def _advance(x1, x2, x3, v1, v2, v3, a, b, c, angles, speeds, p, h):  # type: ignore[no-untyped-def]
-    """Inner step of length h: pulley a, b, c, drum angles and speeds at its start, middle and end."""
-    target, to_pulley, stiffness, damping, inverse_mass, gravity, free_length, radius = p
-    la, lb, lc = free_length + radius * angles[0], free_length + radius * angles[1], free_length + radius * angles[2]
-    ra, rb, rc = radius * speeds[0], radius * speeds[1], radius * speeds[2]
-    return rk4_step(
-        x1,
-        x2,
-        x3,
-        v1,
-        v2,
-        v3,
-        (a[0], a[1], a[2], a[3], a[4], a[5], la, ra, stiffness / la),
-        (b[0], b[1], b[2], b[3], b[4], b[5], lb, rb, stiffness / lb),
-        (c[0], c[1], c[2], c[3], c[4], c[5], lc, rc, stiffness / lc),
-        h,
-        target,
-        to_pulley,
-        damping,
-        inverse_mass,
-        gravity,
+def _drum(row):  # type: ignore[no-untyped-def]
+    """Drum of an engine's row."""
+    return _Drum(row[at.DRUM_RADIUS], row[at.FREE_LENGTH], row[at.AXIAL_STIFFNESS])
+
+
+@scalar
+def _rope_end(point, angle, speed, drum):  # type: ignore[no-untyped-def]
+    """Upper end of the rope: pulley ``point`` (6,), and the drum's angle and speed."""
+    length = drum.free_length + drum.radius * angle
+    return RopeEnd(
+        Vector(point[0], point[1], point[2]),
+        Vector(point[3], point[4], point[5]),
+        length,
+        drum.radius * speed,
+        drum.axial_stiffness / length,
     )
 
 
@@ -94,29 +101,20 @@ def _advance(x1, x2, x3, v1, v2, v3, a, b, c, angles, speeds, p, h):  # type: ig
 def _kernel() -> Callable[..., tuple[float, float, float]]:
 
     @kernel
-    def evaluate(
-        path: FloatArray,
-        angle: FloatArray,
-        speed: FloatArray,
-        start: tuple[float, ...],
-        p: tuple[float, ...],
-        h: float,
-        errors: FloatArray,
-    ) -> tuple[float, float, float]:
-        target = p[0]
-        x1, x2, x3, v1, v2, v3 = start
+    def evaluate(path, angle, speed, row, h, errors):  # type: ignore[no-untyped-def]
+        target, constants, drum = row[at.TARGET], load_constants(row, 1.0, 1, 0), _drum(row)  # type: ignore[no-untyped-call]
+        load = Load(three(row, at.LOAD_POSITION, 1, 0), three(row, at.LOAD_VELOCITY, 1, 0))
         omega1 = 0.0
-        lowest = highest = x3 - target
-        errors[0] = x3 - target
+        lowest = highest = load.position.z - target
+        errors[0] = load.position.z - target
         for i in range((path.shape[0] - 1) // 2):
             k = 2 * i
-            angles = (angle[k], angle[k + 1], angle[k + 2])
-            speeds = (speed[k], speed[k + 1], speed[k + 2])
-            x1, x2, x3, v1, v2, v3, cost, _ = _advance(  # type: ignore[no-untyped-call]
-                x1, x2, x3, v1, v2, v3, path[k], path[k + 1], path[k + 2], angles, speeds, p, h
-            )
+            start = _rope_end(path[k], angle[k], speed[k], drum)  # type: ignore[no-untyped-call]
+            middle = _rope_end(path[k + 1], angle[k + 1], speed[k + 1], drum)  # type: ignore[no-untyped-call]
+            end = _rope_end(path[k + 2], angle[k + 2], speed[k + 2], drum)  # type: ignore[no-untyped-call]
+            load, cost, _ = rk4_step(load, start, middle, end, h, target, constants)
             omega1 += cost
-            error = x3 - target
+            error = load.position.z - target
             errors[i + 1] = error
             lowest = min(lowest, error)
             highest = max(highest, error)
@@ -129,34 +127,28 @@ def _kernel() -> Callable[..., tuple[float, float, float]]:
 def _lanes_kernel() -> Callable[..., None]:
 
     @kernel
-    def evaluate(
-        path: FloatArray,
-        angle: FloatArray,
-        speed: FloatArray,
-        more_angle: FloatArray,
-        more_speed: FloatArray,
-        start: tuple[float, ...],
-        p: tuple[float, ...],
-        h: float,
-        errors: FloatArray,
-    ) -> None:
-        target = p[0]
+    def evaluate(path, angle, speed, more_angle, more_speed, row, h, errors):  # type: ignore[no-untyped-def]
+        target, constants, drum = row[at.TARGET], load_constants(row, 1.0, 1, 0), _drum(row)  # type: ignore[no-untyped-call]
         lanes = more_angle.shape[1]
-        x1, x2, x3 = np.full(lanes, start[0]), np.full(lanes, start[1]), np.full(lanes, start[2])
-        v1, v2, v3 = np.full(lanes, start[3]), np.full(lanes, start[4]), np.full(lanes, start[5])
-        errors[0] = start[2] - target
+        place, velocity = three(row, at.LOAD_POSITION, 1, 0), three(row, at.LOAD_VELOCITY, 1, 0)
+        # Arrays of their own, so that the compiler can tell them apart and vectorise the loop over lanes.
+        x, y, z = np.full(lanes, place.x), np.full(lanes, place.y), np.full(lanes, place.z)
+        u, v, w = np.full(lanes, velocity.x), np.full(lanes, velocity.y), np.full(lanes, velocity.z)
+        errors[0] = place.z - target
         for i in range((path.shape[0] - 1) // 2):
             k = 2 * i
             a, b, c = path[k], path[k + 1], path[k + 2]
             angle_a, angle_b, angle_c = angle[k], angle[k + 1], angle[k + 2]
             speed_a, speed_b, speed_c = speed[k], speed[k + 1], speed[k + 2]
             for j in range(lanes):
-                angles = (angle_a + more_angle[k, j], angle_b + more_angle[k + 1, j], angle_c + more_angle[k + 2, j])
-                speeds = (speed_a + more_speed[k, j], speed_b + more_speed[k + 1, j], speed_c + more_speed[k + 2, j])
-                x1[j], x2[j], x3[j], v1[j], v2[j], v3[j], _, _ = _advance(  # type: ignore[no-untyped-call]
-                    x1[j], x2[j], x3[j], v1[j], v2[j], v3[j], a, b, c, angles, speeds, p, h
-                )
-                errors[i + 1, j] = x3[j] - target
+                start = _rope_end(a, angle_a + more_angle[k, j], speed_a + more_speed[k, j], drum)  # type: ignore[no-untyped-call]
+                middle = _rope_end(b, angle_b + more_angle[k + 1, j], speed_b + more_speed[k + 1, j], drum)  # type: ignore[no-untyped-call]
+                end = _rope_end(c, angle_c + more_angle[k + 2, j], speed_c + more_speed[k + 2, j], drum)  # type: ignore[no-untyped-call]
+                load = Load(Vector(x[j], y[j], z[j]), Vector(u[j], v[j], w[j]))
+                load, _, _ = rk4_step(load, start, middle, end, h, target, constants)
+                x[j], y[j], z[j] = load.position
+                u[j], v[j], w[j] = load.velocity
+                errors[i + 1, j] = load.position.z - target
 
     return evaluate
 
@@ -182,28 +174,19 @@ class Objective:
         self.path = np.empty((len(self.times), 6))
         """(2 steps + 1, 6): pulley's position and velocity at ``times``, base frame."""
         self.path[0] = row[at.PULLEY : at.PULLEY + 6]
-        self._start = tuple(row[at.LOAD_POSITION : at.LOAD_POSITION + 6].tolist())
+        at_start = engine.copy_row(0)
         for i in range(1, len(self.times)):
             engine.step(still)
             self.path[i] = row[at.PULLEY : at.PULLEY + 6]
-        crane = scenario.crane
-        self._parameters = (
-            float(scenario.target_level),
-            crane.drum_to_pulley,
-            float(crane.rope.axial_stiffness),
-            float(scenario.rope_damping),
-            1.0 / float(scenario.load_mass),
-            float(scenario.gravity),
-            scenario.free_length,
-            crane.winch.drum_radius,
-        )
+        self._row = engine.copy_row(0)
+        """The engine's row of the scenario, its load at the start."""
+        for slot in (at.LOAD_POSITION, at.LOAD_VELOCITY):
+            self._row[slot : slot + 3] = at_start[slot : slot + 3]
         self._errors = np.empty(self.steps + 1)
 
     def evaluate(self, angle: FloatArray, speed: FloatArray) -> Outcome:
         """Outcome of a drum angle [rad] and speed [rad/s] given at ``times``."""
-        omega1, lowest, highest = _kernel()(
-            self.path, angle, speed, self._start, self._parameters, self.step, self._errors
-        )
+        omega1, lowest, highest = _kernel()(self.path, angle, speed, self._row, self.step, self._errors)
         return Outcome(omega1, max(-lowest, highest), lowest, highest, self.duration)
 
     def errors(self, angle: FloatArray, speed: FloatArray) -> FloatArray:
@@ -219,9 +202,7 @@ class Objective:
         The neighbours run side by side, in the lanes of the processor's registers.
         """
         errors = np.empty((self.steps + 1, more_angle.shape[1]))
-        _lanes_kernel()(
-            self.path, angle, speed, more_angle, more_speed, self._start, self._parameters, self.step, errors
-        )
+        _lanes_kernel()(self.path, angle, speed, more_angle, more_speed, self._row, self.step, errors)
         return errors
 
     def drive(self, drive: Drive) -> Outcome:

@@ -17,6 +17,7 @@ from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.compiling import fma, scalar
 from aframe_env.dynamics.layout import Span
 from aframe_env.dynamics.transforms import rotate_pair
+from aframe_env.dynamics.vector import Vector
 
 Block = npt.NDArray[np.float64]
 
@@ -205,7 +206,7 @@ def on_quintic(c0: float, c1: float, c2: float, c3: float, c4: float, c5: float,
 
 
 @scalar
-def bend(c2: float, c3: float, c4: float, c5: float, t: float) -> float:
+def second_derivative(c2: float, c3: float, c4: float, c5: float, t: float) -> float:
     """Second derivative of the quintic."""
     return 2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5))
 
@@ -223,6 +224,15 @@ def on_path(row: Block, axis: int, t: float, lanes: int, j: int) -> tuple[float,
         row[(c + 5) * lanes + j],
         t,
     )
+
+
+@scalar
+def pulley_on_path(row: Block, t: float, lanes: int, j: int) -> tuple[Vector, Vector]:
+    """Position and velocity of lane j's pulley, ``t`` s after the knot before."""
+    x, u = on_path(row, 0, t, lanes, j)
+    y, v = on_path(row, 1, t, lanes, j)
+    z, w = on_path(row, 2, t, lanes, j)
+    return Vector(x, y, z), Vector(u, v, w)
 
 
 @scalar
@@ -321,7 +331,7 @@ def end_motion(row: Block, span: Span) -> None:
     for axis in range(3):
         c = at.PATH + 6 * axis
         for j in range(span.begin, span.end):
-            row[(at.PULLEY + 6 + axis) * lanes + j] = bend(
+            row[(at.PULLEY + 6 + axis) * lanes + j] = second_derivative(
                 row[(c + 2) * lanes + j],
                 row[(c + 3) * lanes + j],
                 row[(c + 4) * lanes + j],

@@ -11,11 +11,11 @@ import numpy.typing as npt
 from numba import prange
 
 from aframe_env.dynamics import layout as at
+from aframe_env.dynamics.blocks import put_three, three
 from aframe_env.dynamics.compiling import fma, kernel, larger, parallel_kernel, scalar, select
-from aframe_env.dynamics.integrator import rk4_step
 from aframe_env.dynamics.layout import LANES, Span
-from aframe_env.dynamics.motion import advance_motion, deck_coordinate, end_motion, on_path, start_motion
-from aframe_env.dynamics.simplified import load_acceleration
+from aframe_env.dynamics.load import Load, RopeEnd, load_acceleration, load_constants, rk4_step
+from aframe_env.dynamics.motion import advance_motion, deck_coordinate, end_motion, pulley_on_path, start_motion
 from aframe_env.dynamics.winch import drum_state, next_error, plan
 
 Array = npt.NDArray[np.float64]
@@ -107,55 +107,26 @@ def inner_step(row: Array, index: int, span: Span) -> None:
         parted, target = row[at.PARTED * lanes + j], row[at.TARGET * lanes + j]
         intact = 1.0 - parted
         since_knot = row[at.ELAPSED * lanes + j]
-        a1, b1 = on_path(row, 0, since_knot + middle, lanes, j)
-        a2, b2 = on_path(row, 1, since_knot + middle, lanes, j)
-        a3, b3 = on_path(row, 2, since_knot + middle, lanes, j)
-        c1, d1 = on_path(row, 0, since_knot + end, lanes, j)
-        c2, d2 = on_path(row, 1, since_knot + end, lanes, j)
-        c3, d3 = on_path(row, 2, since_knot + end, lanes, j)
-        x1, x2, x3, v1, v2, v3, cost, peak = rk4_step(
-            row[at.LOAD_POSITION * lanes + j],
-            row[(at.LOAD_POSITION + 1) * lanes + j],
-            row[(at.LOAD_POSITION + 2) * lanes + j],
-            row[at.LOAD_VELOCITY * lanes + j],
-            row[(at.LOAD_VELOCITY + 1) * lanes + j],
-            row[(at.LOAD_VELOCITY + 2) * lanes + j],
-            (
-                row[at.PULLEY * lanes + j],
-                row[(at.PULLEY + 1) * lanes + j],
-                row[(at.PULLEY + 2) * lanes + j],
-                row[(at.PULLEY + 3) * lanes + j],
-                row[(at.PULLEY + 4) * lanes + j],
-                row[(at.PULLEY + 5) * lanes + j],
-                length0,
-                rate0,
-                intact * stiffness0,
-            ),
-            (a1, a2, a3, b1, b2, b3, length1, radius * speed1, intact * stiffness1),
-            (c1, c2, c3, d1, d2, d3, length2, radius * speed2, intact * stiffness2),
+        pulley1, pulley_rate1 = pulley_on_path(row, since_knot + middle, lanes, j)
+        pulley2, pulley_rate2 = pulley_on_path(row, since_knot + end, lanes, j)
+        pulley0, pulley_rate0 = three(row, at.PULLEY, lanes, j), three(row, at.PULLEY + 3, lanes, j)
+        load, cost, peak = rk4_step(
+            Load(three(row, at.LOAD_POSITION, lanes, j), three(row, at.LOAD_VELOCITY, lanes, j)),
+            RopeEnd(pulley0, pulley_rate0, length0, rate0, intact * stiffness0),
+            RopeEnd(pulley1, pulley_rate1, length1, radius * speed1, intact * stiffness1),
+            RopeEnd(pulley2, pulley_rate2, length2, radius * speed2, intact * stiffness2),
             select(active, full, 0.0),
             target,
-            row[at.DRUM_TO_PULLEY * lanes + j],
-            intact * row[at.ROPE_DAMPING * lanes + j],
-            row[at.INVERSE_MASS * lanes + j],
-            row[at.GRAVITY * lanes + j],
+            load_constants(row, intact, lanes, j),
         )
-        row[at.LOAD_POSITION * lanes + j] = x1
-        row[(at.LOAD_POSITION + 1) * lanes + j] = x2
-        row[(at.LOAD_POSITION + 2) * lanes + j] = x3
-        row[at.LOAD_VELOCITY * lanes + j] = v1
-        row[(at.LOAD_VELOCITY + 1) * lanes + j] = v2
-        row[(at.LOAD_VELOCITY + 2) * lanes + j] = v3
-        row[at.PULLEY * lanes + j] = c1
-        row[(at.PULLEY + 1) * lanes + j] = c2
-        row[(at.PULLEY + 2) * lanes + j] = c3
-        row[(at.PULLEY + 3) * lanes + j] = d1
-        row[(at.PULLEY + 4) * lanes + j] = d2
-        row[(at.PULLEY + 5) * lanes + j] = d3
+        put_three(row, at.LOAD_POSITION, lanes, j, load.position)
+        put_three(row, at.LOAD_VELOCITY, lanes, j, load.velocity)
+        put_three(row, at.PULLEY, lanes, j, pulley2)
+        put_three(row, at.PULLEY + 3, lanes, j, pulley_rate2)
         row[at.STEP_COST * lanes + j] += cost
         # What is never negative is taken by its magnitude, PARTED through its complement: these are the same numbers,
         # but the compiler would see that a store changes nothing and leave it out in some lanes, as in ``select``.
-        row[at.OMEGA2 * lanes + j] = larger(abs(x3 - target), abs(row[at.OMEGA2 * lanes + j]))
+        row[at.OMEGA2 * lanes + j] = larger(abs(load.position.z - target), abs(row[at.OMEGA2 * lanes + j]))
         # A lane that stands still has met its pulley and drum beyond the segment: what it felt there is no tension.
         slack = active & (peak <= 0.0)
         row[at.SLACK * lanes + j] = larger(select(slack, 1.0, 0.0), abs(row[at.SLACK * lanes + j]))
@@ -172,26 +143,16 @@ def measure_tension(row: Array, span: Span) -> None:
         radius = row[at.DRUM_RADIUS * lanes + j]
         length = fma(radius, row[at.DRUM_ANGLE * lanes + j], row[at.FREE_LENGTH * lanes + j])
         intact = 1.0 - row[at.PARTED * lanes + j]
-        _, _, _, force = load_acceleration(
-            row[at.LOAD_POSITION * lanes + j],
-            row[(at.LOAD_POSITION + 1) * lanes + j],
-            row[(at.LOAD_POSITION + 2) * lanes + j],
-            row[at.LOAD_VELOCITY * lanes + j],
-            row[(at.LOAD_VELOCITY + 1) * lanes + j],
-            row[(at.LOAD_VELOCITY + 2) * lanes + j],
-            row[at.PULLEY * lanes + j],
-            row[(at.PULLEY + 1) * lanes + j],
-            row[(at.PULLEY + 2) * lanes + j],
-            row[(at.PULLEY + 3) * lanes + j],
-            row[(at.PULLEY + 4) * lanes + j],
-            row[(at.PULLEY + 5) * lanes + j],
-            length,
-            radius * row[at.DRUM_SPEED * lanes + j],
-            intact * row[at.AXIAL_STIFFNESS * lanes + j] / length,
-            row[at.DRUM_TO_PULLEY * lanes + j],
-            intact * row[at.ROPE_DAMPING * lanes + j],
-            1.0,
-            0.0,
+        _, force = load_acceleration(
+            Load(three(row, at.LOAD_POSITION, lanes, j), three(row, at.LOAD_VELOCITY, lanes, j)),
+            RopeEnd(
+                three(row, at.PULLEY, lanes, j),
+                three(row, at.PULLEY + 3, lanes, j),
+                length,
+                radius * row[at.DRUM_SPEED * lanes + j],
+                intact * row[at.AXIAL_STIFFNESS * lanes + j] / length,
+            ),
+            load_constants(row, intact, lanes, j),
         )
         row[at.TENSION * lanes + j] = force
         row[at.SLACK * lanes + j] = 1.0 if force <= 0.0 else row[at.SLACK * lanes + j]

@@ -2,7 +2,7 @@
 //
 // A load on an elastic rope that cannot push, hung from a pulley whose path is given as a quintic for each control
 // step, on a drum that follows its commanded speed within limits of speed and acceleration: the equations of
-// aframe_env/dynamics/{rope,simplified,integrator,winch,step}.py, RK4, and nothing else (no sea, no lag, no limit
+// aframe_env/dynamics/{load,winch,step}.py, RK4, and nothing else (no sea, no lag, no limit
 // switches, no parting rope). Rows in blocks of LANES, structure of arrays within a block.
 
 #include <cmath>

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aframe_env.dynamics.rope import tension
+from aframe_env.dynamics.load import tension
 
 
 @settings(max_examples=100, deadline=None)

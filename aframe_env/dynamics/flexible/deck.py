@@ -9,7 +9,7 @@ from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.compiling import scalar
 from aframe_env.dynamics.flexible import layout as flex
 from aframe_env.dynamics.layout import Span
-from aframe_env.dynamics.motion import advance_motion, bend, meet_knot, on_quintic, quintic
+from aframe_env.dynamics.motion import advance_motion, meet_knot, on_quintic, quintic, second_derivative
 from aframe_env.dynamics.transforms import turn
 
 Block = npt.NDArray[np.float64]
@@ -42,7 +42,7 @@ def coordinate_at(frame: Block, dof: int, elapsed: float, lanes: int, j: int) ->
     c2, c3 = frame[(c + 2) * lanes + j], frame[(c + 3) * lanes + j]
     c4, c5 = frame[(c + 4) * lanes + j], frame[(c + 5) * lanes + j]
     place, rate = on_quintic(frame[c * lanes + j], frame[(c + 1) * lanes + j], c2, c3, c4, c5, elapsed)
-    return place, rate, bend(c2, c3, c4, c5, elapsed)
+    return place, rate, second_derivative(c2, c3, c4, c5, elapsed)
 
 
 @scalar

@@ -2,7 +2,7 @@
 
 η(h) = η + h η̇ + (1/2 - β) h² η̈ + β h² η̈(h), η̇(h) = η̇ + (h/2)(η̈ + η̈(h)), with η̈ + ΦᵀLΦ η̇ + ω² η = F at the end. F is
 linear in the rope's force at S, so that a step is a first pass without it, the rope's equation in three dimensions
-(``pull``), and a second pass.
+(``step_rope_and_load``), and a second pass.
 
 Constants, and the slots of a mode as an array of their own, are taken before each loop over lanes: only so can the
 compiler tell what a store may change, and vectorise the loop.
@@ -13,9 +13,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from aframe_env.dynamics.blocks import nine, three
 from aframe_env.dynamics.compiling import scalar
 from aframe_env.dynamics.flexible import layout as flex
-from aframe_env.dynamics.flexible.blocks import nine, three
 
 Array = npt.NDArray[np.float64]
 
@@ -97,7 +97,7 @@ def load_mode(frame: Array, mode: Array, table: Array, i: int, modes: int, carri
 
 
 @scalar
-def predict(frame: Array, table: Array, lanes: int) -> None:
+def newmark_predict(frame: Array, table: Array, lanes: int) -> None:
     """First pass: modes to the step's end without the rope's force there, and TIP.
 
     POSITION and RATE become the end's share that is known already, ACCELERATION that without the rope's force. Lanes
@@ -179,7 +179,7 @@ def add_to_tip(
 
 
 @scalar
-def finish(frame: Array, table: Array, lanes: int) -> None:
+def newmark_correct(frame: Array, table: Array, lanes: int) -> None:
     """Second pass: the rope's force PULL at the step's end added, and the modes brought there."""
     half = 0.5 * table[flex.STEP]
     for i in range(int(table[flex.COUNT])):

@@ -54,9 +54,9 @@ COUPLED: Final = 2
 """1 where the damping couples the modes."""
 STEP: Final = 3
 """h, s."""
-GIVE: Final = 4
+COMPLIANCE: Final = 4
 """Displacement of S at the step's end for a unit force there at that time, 9, m/N."""
-GIVE_RATE: Final = 13
+COMPLIANCE_RATE: Final = 13
 """Its rate, 9, m/(s N)."""
 REST: Final = 22
 """Displacement of S at rest for a unit force there, 9, m/N."""

@@ -16,9 +16,9 @@ import numpy.typing as npt
 from numba import prange
 
 from aframe_env.crane import Frame
+from aframe_env.dynamics.blocks import nine
 from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar
 from aframe_env.dynamics.flexible import layout as flex
-from aframe_env.dynamics.flexible.blocks import nine
 from aframe_env.dynamics.flexible.reduction import ModalFrame, modal_frame
 from aframe_env.dynamics.rfem.chain import Division
 from aframe_env.dynamics.rfem.model import SMALL_ROTATION, FrameModel

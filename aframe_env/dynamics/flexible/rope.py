@@ -1,96 +1,119 @@
 """Rope between load, pulley S on the flexible frame, and drum: its force at the end of a step, implicitly.
 
-All in {D}. The frame and the load answer the rope's force linearly, so each sweep solves the tension exactly for
-the directions of the sweep before: what remains falls by some 4e-4 a sweep.
+All in {D}. The frame and the load answer the rope's force linearly, so each iteration solves the tension exactly for
+the directions of the one before: what remains falls by some 4e-4 an iteration.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from aframe_env.dynamics.compiling import scalar
-from aframe_env.dynamics.rope import tension
+from aframe_env.dynamics.load import tension
+from aframe_env.dynamics.vector import Vector, add, cross, difference, inner, scaled
 
-Vector = tuple[float, float, float]
+Matrix = tuple[float, float, float, float, float, float, float, float, float]
+"""3 × 3, row-major."""
+
+
+class Unloaded(NamedTuple):
+    """Places and rates at the step's end without the rope's force there, along {D}."""
+
+    pulley: Vector
+    """m."""
+    pulley_rate: Vector
+    """m/s."""
+    load: Vector
+    """m."""
+    load_rate: Vector
+    """Relative to the base frame, less the deck's own, m/s."""
+    drum: Vector
+    """m."""
+    spin: Vector
+    """Angular velocity of the deck, rad/s."""
+
+
+class Compliance(NamedTuple):
+    """What a unit force at the step's end adds there."""
+
+    pulley: Matrix
+    """Displacement of S, m/N."""
+    pulley_rate: Matrix
+    """m/(s N)."""
+    load: float
+    """Displacement of the load, m/N."""
+    load_rate: float
+    """m/(s N)."""
+
+
+class PaidOut(NamedTuple):
+    """Rope that the drum has paid out."""
+
+    length: float
+    """Unstretched, between drum and load, m."""
+    speed: float
+    """Its rate, m/s."""
+    axial_stiffness: float
+    """E_R F_R, N."""
+    damping: float
+    """d_R, N s/m."""
+
+
+class Pull(NamedTuple):
+    """The rope's force."""
+
+    tension: float
+    """N."""
+    to_load: Vector
+    """Unit vector from S to the load."""
+    to_drum: Vector
+    """Unit vector from S to the drum."""
 
 
 @scalar
-def apply(m: tuple[float, ...], x: float, y: float, z: float) -> Vector:
-    """Product of a 3 × 3 matrix (row-major) and a vector."""
-    return (m[0] * x + m[1] * y + m[2] * z, m[3] * x + m[4] * y + m[5] * z, m[6] * x + m[7] * y + m[8] * z)
+def apply(m: Matrix, v: Vector) -> Vector:
+    """Product of a matrix and a vector."""
+    return Vector(
+        m[0] * v.x + m[1] * v.y + m[2] * v.z, m[3] * v.x + m[4] * v.y + m[5] * v.z, m[6] * v.x + m[7] * v.y + m[8] * v.z
+    )
 
 
 @scalar
-def apply_transposed(m: tuple[float, ...], x: float, y: float, z: float) -> Vector:
-    """Product of the transpose of a 3 × 3 matrix (row-major) and a vector."""
-    return (m[0] * x + m[3] * y + m[6] * z, m[1] * x + m[4] * y + m[7] * z, m[2] * x + m[5] * y + m[8] * z)
+def apply_transposed(m: Matrix, v: Vector) -> Vector:
+    """Product of the transpose of a matrix and a vector."""
+    return Vector(
+        m[0] * v.x + m[3] * v.y + m[6] * v.z, m[1] * v.x + m[4] * v.y + m[7] * v.z, m[2] * v.x + m[5] * v.y + m[8] * v.z
+    )
 
 
 @scalar
-def unit(x: float, y: float, z: float) -> tuple[float, float, float, float]:
+def unit(v: Vector) -> tuple[float, Vector]:
     """Length and unit vector; a vector of no length counts as 1 nm."""
-    length = math.sqrt(x * x + y * y + z * z + 1e-18)
-    return length, x / length, y / length, z / length
+    length = math.sqrt(v.x * v.x + v.y * v.y + v.z * v.z + 1e-18)
+    return length, Vector(v.x / length, v.y / length, v.z / length)
 
 
 @scalar
-def sweep(
-    force: float,
-    to_load: Vector,
-    to_drum: Vector,
-    pulley: Vector,
-    pulley_rate: Vector,
-    load: Vector,
-    load_rate: Vector,
-    drum: Vector,
-    spin: Vector,
-    give: tuple[float, ...],
-    give_rate: tuple[float, ...],
-    load_give: float,
-    load_give_rate: float,
-    length: float,
-    pay_out_speed: float,
-    axial_stiffness: float,
-    damping: float,
-) -> tuple[float, Vector, Vector]:
-    """Tension [N] and unit vectors from S to load and drum, better than those given.
-
-    ``pulley``, ``load`` (and rates) are the places at the step's end without the rope's force there, along {D}; the
-    load's rate is the one relative to the base frame, less the deck's own. ``give``, ``load_give`` (and rates):
-    what a unit force there adds.
-    """
-    a1, a2, a3 = to_load[0] + to_drum[0], to_load[1] + to_drum[1], to_load[2] + to_drum[2]
-    g1, g2, g3 = apply(give, a1, a2, a3)
-    r1, r2, r3 = apply(give_rate, a1, a2, a3)
-    s1, s2, s3 = pulley[0] + force * g1, pulley[1] + force * g2, pulley[2] + force * g3
-    u1, u2, u3 = pulley_rate[0] + force * r1, pulley_rate[1] + force * r2, pulley_rate[2] + force * r3
-    pull, pull_rate = force * load_give, force * load_give_rate
-    x1, x2, x3 = load[0] - pull * to_load[0], load[1] - pull * to_load[1], load[2] - pull * to_load[2]
-    v1, v2, v3 = (
-        load_rate[0] - pull_rate * to_load[0],
-        load_rate[1] - pull_rate * to_load[1],
-        load_rate[2] - pull_rate * to_load[2],
-    )
-    hanging, l1, l2, l3 = unit(x1 - s1, x2 - s2, x3 - s3)
-    inboard, h1, h2, h3 = unit(drum[0] - s1, drum[1] - s2, drum[2] - s3)
+def iterate_tension(pull: Pull, unloaded: Unloaded, compliance: Compliance, rope: PaidOut) -> Pull:
+    """Tension and directions of the rope, better than those of ``pull``."""
+    force = pull.tension
+    a = add(pull.to_load, pull.to_drum)
+    g, r = apply(compliance.pulley, a), apply(compliance.pulley_rate, a)
+    s = add(unloaded.pulley, scaled(force, g))
+    u = add(unloaded.pulley_rate, scaled(force, r))
+    x = difference(unloaded.load, scaled(force * compliance.load, pull.to_load))
+    v = difference(unloaded.load_rate, scaled(force * compliance.load_rate, pull.to_load))
+    hanging, to_load = unit(difference(x, s))
+    inboard, to_drum = unit(difference(unloaded.drum, s))
     # The deck's turning moves neither S nor H along their line, and S along the load's as it moves the load.
-    w1 = v1 - (spin[1] * x3 - spin[2] * x2) - u1
-    w2 = v2 - (spin[2] * x1 - spin[0] * x3) - u2
-    w3 = v3 - (spin[0] * x2 - spin[1] * x1) - u3
-    rate = l1 * w1 + l2 * w2 + l3 * w3 - (h1 * u1 + h2 * u2 + h3 * u3)
-    stretch = hanging + inboard - length
-    compliance = load_give + a1 * g1 + a2 * g2 + a3 * g3
-    compliance_rate = load_give_rate + a1 * r1 + a2 * r2 + a3 * r3
+    w = difference(difference(v, cross(unloaded.spin, x)), u)
+    rate = inner(to_load, w) - inner(to_drum, u)
+    stretch = hanging + inboard - rope.length
+    give = compliance.load + a.x * g.x + a.y * g.y + a.z * g.z
+    give_rate = compliance.load_rate + a.x * r.x + a.y * r.y + a.z * r.z
     # As if the rope had given way by what this force explains: the tension then solves the law.
-    stiffness = axial_stiffness / length
-    softened = 1.0 + stiffness * compliance + damping * compliance_rate
-    new_force = (
-        tension(
-            stretch + compliance * force,
-            rate - pay_out_speed + compliance_rate * force,
-            stiffness,
-            damping,
-        )
-        / softened
-    )
-    return new_force, (l1, l2, l3), (h1, h2, h3)
+    stiffness = rope.axial_stiffness / rope.length
+    softened = 1.0 + stiffness * give + rope.damping * give_rate
+    elongation, elongation_rate = stretch + give * force, rate - rope.speed + give_rate * force
+    return Pull(tension(elongation, elongation_rate, stiffness, rope.damping) / softened, to_load, to_drum)

@@ -8,12 +8,22 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
+from aframe_env.dynamics.blocks import nine, put_three, three
 from aframe_env.dynamics.compiling import scalar
 from aframe_env.dynamics.flexible import layout as flex
-from aframe_env.dynamics.flexible.blocks import nine, three
 from aframe_env.dynamics.flexible.deck import deck_now
 from aframe_env.dynamics.flexible.frame import deck_force, slots_of, write_carried
-from aframe_env.dynamics.flexible.rope import apply, apply_transposed, sweep, unit
+from aframe_env.dynamics.flexible.rope import (
+    Compliance,
+    PaidOut,
+    Pull,
+    Unloaded,
+    apply,
+    apply_transposed,
+    iterate_tension,
+    unit,
+)
+from aframe_env.dynamics.vector import Vector, add, cross, difference, scaled
 
 Array = npt.NDArray[np.float64]
 
@@ -37,7 +47,7 @@ def start_rows(row: Array, frame: Array, tables: Array, comoving: float, lanes: 
 
 
 @scalar
-def rest(row: Array, frame: Array, table: Array, lanes: int, j: int) -> tuple[float, float, float]:
+def rest(row: Array, frame: Array, table: Array, lanes: int, j: int) -> Vector:
     """Put the modes at rest under own weight and the load's; return the deflection of S."""
     modes = int(table[flex.COUNT])
     gravity, weight = row[at.GRAVITY * lanes + j], row[at.GRAVITY * lanes + j] * row[at.MASS * lanes + j]
@@ -48,90 +58,73 @@ def rest(row: Array, frame: Array, table: Array, lanes: int, j: int) -> tuple[fl
         w1 += table[c + flex.SHAPE] * place
         w2 += table[c + flex.SHAPE + 1] * place
         w3 += table[c + flex.SHAPE + 2] * place
-    s1, s2, s3 = three(row, at.PULLEY_ON_DECK, lanes, j)
-    h1, h2, h3 = three(frame, flex.DRUM, lanes, j)
-    give = nine(table, flex.REST, 1, 0)
-    u1, u2, u3 = w1, w2, w3
-    f1, f2, f3 = 0.0, 0.0, 0.0
+    pulley, drum = three(row, at.PULLEY_ON_DECK, lanes, j), three(frame, flex.DRUM, lanes, j)
+    compliance = nine(table, flex.REST, 1, 0)
+    own = Vector(w1, w2, w3)
+    u = own
+    f = Vector(0.0, 0.0, 0.0)
     for _ in range(ITERATIONS):
-        _, d1, d2, d3 = unit(h1 - s1 - u1, h2 - s2 - u2, h3 - s3 - u3)
-        f1, f2, f3 = weight * d1, weight * d2, weight * (d3 - 1.0)
-        r1, r2, r3 = apply(give, f1, f2, f3)
-        u1, u2, u3 = w1 + r1, w2 + r2, w3 + r3
+        _, d = unit(difference(difference(drum, pulley), u))
+        f = Vector(weight * d.x, weight * d.y, weight * (d.z - 1.0))
+        u = add(own, apply(compliance, f))
     for i in range(modes):
         c = flex.HEAD + flex.MODE_SIZE * i
         mode = flex.MODES + flex.MODE_SLOTS * i
-        force = table[c + flex.SHAPE] * f1 + table[c + flex.SHAPE + 1] * f2 + table[c + flex.SHAPE + 2] * f3
+        force = table[c + flex.SHAPE] * f.x + table[c + flex.SHAPE + 1] * f.y + table[c + flex.SHAPE + 2] * f.z
         force -= gravity * table[c + flex.FIELD + 2]
         frame[(mode + flex.POSITION) * lanes + j] = force / table[c + flex.SQUARE]
         frame[(mode + flex.RATE) * lanes + j] = 0.0
-    return u1, u2, u3
+    return u
 
 
 @scalar
-def place_load(
-    row: Array, frame: Array, deflection: tuple[float, float, float], comoving: float, lanes: int, j: int
-) -> None:
+def place_load(row: Array, frame: Array, deflection: Vector, comoving: float, lanes: int, j: int) -> None:
     """Hang the load below S by the rope that its weight stretches, at rest or with the velocity of S."""
-    p1, p2, p3 = three(row, at.PULLEY_ON_DECK, lanes, j)
-    s1, s2, s3 = p1 + deflection[0], p2 + deflection[1], p3 + deflection[2]
-    h1, h2, h3 = three(frame, flex.DRUM, lanes, j)
-    inboard, _, _, _ = unit(h1 - s1, h2 - s2, h3 - s3)
+    pulley = add(three(row, at.PULLEY_ON_DECK, lanes, j), deflection)
+    inboard, _ = unit(difference(three(frame, flex.DRUM, lanes, j), pulley))
     weight = row[at.GRAVITY * lanes + j] * row[at.MASS * lanes + j]
     hanging = row[at.FREE_LENGTH * lanes + j] * (1.0 + weight / row[at.AXIAL_STIFFNESS * lanes + j]) - inboard
     turned = nine(frame, flex.ROTATION, lanes, j)
-    o1, o2, o3 = three(frame, flex.ORIGIN, lanes, j)
-    v1, v2, v3 = three(frame, flex.ORIGIN + 3, lanes, j)
-    x, y, z = three(frame, flex.SPIN, lanes, j)
-    r1, r2, r3 = apply(turned, s1, s2, s3)
-    w1, w2, w3 = apply(turned, y * s3 - z * s2, z * s1 - x * s3, x * s2 - y * s1)
-    row[at.LOAD_POSITION * lanes + j] = o1 + r1
-    row[(at.LOAD_POSITION + 1) * lanes + j] = o2 + r2
-    row[(at.LOAD_POSITION + 2) * lanes + j] = o3 + r3 - hanging
-    row[at.LOAD_VELOCITY * lanes + j] = comoving * (v1 + w1)
-    row[(at.LOAD_VELOCITY + 1) * lanes + j] = comoving * (v2 + w2)
-    row[(at.LOAD_VELOCITY + 2) * lanes + j] = comoving * (v3 + w3)
+    place = add(three(frame, flex.ORIGIN, lanes, j), apply(turned, pulley))
+    turning = apply(turned, cross(three(frame, flex.SPIN, lanes, j), pulley))
+    velocity = add(three(frame, flex.ORIGIN + 3, lanes, j), turning)
+    put_three(row, at.LOAD_POSITION, lanes, j, Vector(place.x, place.y, place.z - hanging))
+    put_three(row, at.LOAD_VELOCITY, lanes, j, scaled(comoving, velocity))
     row[at.OMEGA2 * lanes + j] = abs(row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j])
 
 
 @scalar
-def release(row: Array, frame: Array, table: Array, deflection: tuple[float, float, float], lanes: int, j: int) -> None:
+def release(row: Array, frame: Array, table: Array, deflection: Vector, lanes: int, j: int) -> None:
     """Rope force at the start, and the accelerations of load and modes that follow from it."""
-    p1, p2, p3 = three(row, at.PULLEY_ON_DECK, lanes, j)
-    pulley = (p1 + deflection[0], p2 + deflection[1], p3 + deflection[2])
-    turned, spin = nine(frame, flex.ROTATION, lanes, j), three(frame, flex.SPIN, lanes, j)
-    drum = three(frame, flex.DRUM, lanes, j)
-    x1, x2, x3 = three(row, at.LOAD_POSITION, lanes, j)
-    v1, v2, v3 = three(row, at.LOAD_VELOCITY, lanes, j)
-    o1, o2, o3 = three(frame, flex.ORIGIN, lanes, j)
-    q1, q2, q3 = three(frame, flex.ORIGIN + 3, lanes, j)
+    pulley = add(three(row, at.PULLEY_ON_DECK, lanes, j), deflection)
+    turned = nine(frame, flex.ROTATION, lanes, j)
+    load, velocity = three(row, at.LOAD_POSITION, lanes, j), three(row, at.LOAD_VELOCITY, lanes, j)
     mass, gravity = row[at.MASS * lanes + j], row[at.GRAVITY * lanes + j]
-    still = (0.0, 0.0, 0.0)
-    force, to_load, to_drum = sweep(
-        0.0,
-        still,
-        still,
-        pulley,
-        still,
-        apply_transposed(turned, x1 - o1, x2 - o2, x3 - o3),
-        apply_transposed(turned, v1 - q1, v2 - q2, v3 - q3),
-        drum,
-        spin,
-        NOTHING,
-        NOTHING,
-        0.0,
-        0.0,
-        row[at.FREE_LENGTH * lanes + j],
-        0.0,
-        row[at.AXIAL_STIFFNESS * lanes + j],
-        row[at.ROPE_DAMPING * lanes + j],
+    still = Vector(0.0, 0.0, 0.0)
+    pull = iterate_tension(
+        Pull(0.0, still, still),
+        Unloaded(
+            pulley,
+            still,
+            apply_transposed(turned, difference(load, three(frame, flex.ORIGIN, lanes, j))),
+            apply_transposed(turned, difference(velocity, three(frame, flex.ORIGIN + 3, lanes, j))),
+            three(frame, flex.DRUM, lanes, j),
+            three(frame, flex.SPIN, lanes, j),
+        ),
+        Compliance(NOTHING, NOTHING, 0.0, 0.0),
+        PaidOut(
+            row[at.FREE_LENGTH * lanes + j],
+            0.0,
+            row[at.AXIAL_STIFFNESS * lanes + j],
+            row[at.ROPE_DAMPING * lanes + j],
+        ),
     )
-    n1, n2, n3 = apply(turned, to_load[0], to_load[1], to_load[2])
-    frame[flex.LOAD_ACCELERATION * lanes + j] = -force / mass * n1
-    frame[(flex.LOAD_ACCELERATION + 1) * lanes + j] = -force / mass * n2
-    frame[(flex.LOAD_ACCELERATION + 2) * lanes + j] = -force / mass * n3 - gravity
+    force, n = pull.tension, apply(turned, pull.to_load)
+    frame[flex.LOAD_ACCELERATION * lanes + j] = -force / mass * n.x
+    frame[(flex.LOAD_ACCELERATION + 1) * lanes + j] = -force / mass * n.y
+    frame[(flex.LOAD_ACCELERATION + 2) * lanes + j] = -force / mass * n.z - gravity
     for k in range(3):
-        frame[(flex.PULL + k) * lanes + j] = force * (to_load[k] + to_drum[k])
+        frame[(flex.PULL + k) * lanes + j] = force * (pull.to_load[k] + pull.to_drum[k])
     row[at.TENSION * lanes + j] = force
     row[at.PEAK_TENSION * lanes + j] = force
     row[at.SLACK * lanes + j] = 1.0 if force <= 0.0 else 0.0

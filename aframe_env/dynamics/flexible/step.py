@@ -11,15 +11,25 @@ import numpy.typing as npt
 from numba import prange
 
 from aframe_env.dynamics import layout as at
+from aframe_env.dynamics.blocks import nine, three
 from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar
 from aframe_env.dynamics.flexible import layout as flex
-from aframe_env.dynamics.flexible.blocks import nine, three
 from aframe_env.dynamics.flexible.deck import advance_deck, deck_at
-from aframe_env.dynamics.flexible.frame import finish, predict
-from aframe_env.dynamics.flexible.rope import apply, apply_transposed, sweep, unit
+from aframe_env.dynamics.flexible.frame import newmark_correct, newmark_predict
+from aframe_env.dynamics.flexible.rope import (
+    Compliance,
+    PaidOut,
+    Pull,
+    Unloaded,
+    apply,
+    apply_transposed,
+    iterate_tension,
+    unit,
+)
 from aframe_env.dynamics.flexible.start import start_rows
 from aframe_env.dynamics.layout import LANES, Span
 from aframe_env.dynamics.step import drum_at, plan_winch
+from aframe_env.dynamics.vector import Vector, add, difference, scaled
 from aframe_env.dynamics.winch import next_error
 
 Array = npt.NDArray[np.float64]
@@ -29,10 +39,10 @@ LOAD_BETA: Final = 1.0 / 12.0
 
 
 @scalar
-def pull(row: Array, frame: Array, table: Array, index: int, lanes: int) -> None:
+def step_rope_and_load(row: Array, frame: Array, table: Array, index: int, lanes: int) -> None:
     """Bring drum and load to the end of inner step ``index``, and find the rope's force there."""
     h = table[flex.STEP]
-    give, give_rate = nine(table, flex.GIVE, 1, 0), nine(table, flex.GIVE_RATE, 1, 0)
+    tip, tip_rate = nine(table, flex.COMPLIANCE, 1, 0), nine(table, flex.COMPLIANCE_RATE, 1, 0)
     late, half = LOAD_BETA * h * h, 0.5 * h
     early = (0.5 - LOAD_BETA) * h * h
     for j in range(lanes):
@@ -47,55 +57,55 @@ def pull(row: Array, frame: Array, table: Array, index: int, lanes: int) -> None
         damping = row[at.ROPE_DAMPING * lanes + j] * (1.0 - parted)
         length = row[at.FREE_LENGTH * lanes + j] + radius * angle
 
-        x1, x2, x3 = three(row, at.LOAD_POSITION, lanes, j)
-        v1, v2, v3 = three(row, at.LOAD_VELOCITY, lanes, j)
-        b1, b2, b3 = three(frame, flex.LOAD_ACCELERATION, lanes, j)
-        y1, y2, y3 = x1 + h * v1 + early * b1, x2 + h * v2 + early * b2, x3 + h * v3 + early * b3 - late * gravity
-        w1, w2, w3 = v1 + half * b1, v2 + half * b2, v3 + half * b3 - half * gravity
-        turned, spin = nine(frame, flex.ROTATION, lanes, j), three(frame, flex.SPIN, lanes, j)
-        o1, o2, o3 = three(frame, flex.ORIGIN, lanes, j)
-        q1, q2, q3 = three(frame, flex.ORIGIN + 3, lanes, j)
-        load = apply_transposed(turned, y1 - o1, y2 - o2, y3 - o3)
-        load_rate = apply_transposed(turned, w1 - q1, w2 - q2, w3 - q3)
-        p1, p2, p3 = three(row, at.PULLEY_ON_DECK, lanes, j)
-        t1, t2, t3 = three(frame, flex.TIP, lanes, j)
-        pulley, pulley_rate = (p1 + t1, p2 + t2, p3 + t3), three(frame, flex.TIP + 3, lanes, j)
-        drum = three(frame, flex.DRUM, lanes, j)
-        _, l1, l2, l3 = unit(load[0] - pulley[0], load[1] - pulley[1], load[2] - pulley[2])
-        _, d1, d2, d3 = unit(drum[0] - pulley[0], drum[1] - pulley[1], drum[2] - pulley[2])
-        force, to_load, to_drum = row[at.TENSION * lanes + j], (l1, l2, l3), (d1, d2, d3)
-        constants = (pulley, pulley_rate, load, load_rate, drum, spin, give, give_rate, late / mass, half / mass)
-        rope = (length, radius * speed, stiffness, damping)
-        force, to_load, to_drum = sweep(force, to_load, to_drum, *constants, *rope)
-        force, to_load, to_drum = sweep(force, to_load, to_drum, *constants, *rope)
-        force, to_load, to_drum = sweep(force, to_load, to_drum, *constants, *rope)
+        x, v = three(row, at.LOAD_POSITION, lanes, j), three(row, at.LOAD_VELOCITY, lanes, j)
+        b = three(frame, flex.LOAD_ACCELERATION, lanes, j)
+        y = Vector(
+            x.x + h * v.x + early * b.x, x.y + h * v.y + early * b.y, x.z + h * v.z + early * b.z - late * gravity
+        )
+        w = Vector(v.x + half * b.x, v.y + half * b.y, v.z + half * b.z - half * gravity)
+        turned = nine(frame, flex.ROTATION, lanes, j)
+        pulley = add(three(row, at.PULLEY_ON_DECK, lanes, j), three(frame, flex.TIP, lanes, j))
+        unloaded = Unloaded(
+            pulley,
+            three(frame, flex.TIP + 3, lanes, j),
+            apply_transposed(turned, difference(y, three(frame, flex.ORIGIN, lanes, j))),
+            apply_transposed(turned, difference(w, three(frame, flex.ORIGIN + 3, lanes, j))),
+            three(frame, flex.DRUM, lanes, j),
+            three(frame, flex.SPIN, lanes, j),
+        )
+        _, to_load = unit(difference(unloaded.load, pulley))
+        _, to_drum = unit(difference(unloaded.drum, pulley))
+        compliance = Compliance(tip, tip_rate, late / mass, half / mass)
+        rope = PaidOut(length, radius * speed, stiffness, damping)
+        pull = Pull(row[at.TENSION * lanes + j], to_load, to_drum)
+        pull = iterate_tension(pull, unloaded, compliance, rope)
+        pull = iterate_tension(pull, unloaded, compliance, rope)
+        pull = iterate_tension(pull, unloaded, compliance, rope)
 
-        n1, n2, n3 = apply(turned, to_load[0], to_load[1], to_load[2])
-        share = -force / mass
-        n1, n2, n3 = share * n1, share * n2, share * n3
-        z1, z2, z3 = y1 + late * n1, y2 + late * n2, y3 + late * n3
-        u1, u2, u3 = w1 + half * n1, w2 + half * n2, w3 + half * n3
-        row[at.LOAD_POSITION * lanes + j] = z1 if active else x1
-        row[(at.LOAD_POSITION + 1) * lanes + j] = z2 if active else x2
-        row[(at.LOAD_POSITION + 2) * lanes + j] = z3 if active else x3
-        row[at.LOAD_VELOCITY * lanes + j] = u1 if active else v1
-        row[(at.LOAD_VELOCITY + 1) * lanes + j] = u2 if active else v2
-        row[(at.LOAD_VELOCITY + 2) * lanes + j] = u3 if active else v3
-        frame[flex.LOAD_ACCELERATION * lanes + j] = n1 if active else b1
-        frame[(flex.LOAD_ACCELERATION + 1) * lanes + j] = n2 if active else b2
-        frame[(flex.LOAD_ACCELERATION + 2) * lanes + j] = n3 - gravity if active else b3
+        force = pull.tension
+        n = scaled(-force / mass, apply(turned, pull.to_load))
+        z, u = add(y, scaled(late, n)), add(w, scaled(half, n))
+        row[at.LOAD_POSITION * lanes + j] = z.x if active else x.x
+        row[(at.LOAD_POSITION + 1) * lanes + j] = z.y if active else x.y
+        row[(at.LOAD_POSITION + 2) * lanes + j] = z.z if active else x.z
+        row[at.LOAD_VELOCITY * lanes + j] = u.x if active else v.x
+        row[(at.LOAD_VELOCITY + 1) * lanes + j] = u.y if active else v.y
+        row[(at.LOAD_VELOCITY + 2) * lanes + j] = u.z if active else v.z
+        frame[flex.LOAD_ACCELERATION * lanes + j] = n.x if active else b.x
+        frame[(flex.LOAD_ACCELERATION + 1) * lanes + j] = n.y if active else b.y
+        frame[(flex.LOAD_ACCELERATION + 2) * lanes + j] = n.z - gravity if active else b.z
         for k in range(3):
             before = frame[(flex.PULL + k) * lanes + j]
-            frame[(flex.PULL + k) * lanes + j] = force * (to_load[k] + to_drum[k]) if active else before
+            frame[(flex.PULL + k) * lanes + j] = force * (pull.to_load[k] + pull.to_drum[k]) if active else before
         row[at.DRUM_ANGLE * lanes + j] = angle if active else row[at.DRUM_ANGLE * lanes + j]
         row[at.DRUM_SPEED * lanes + j] = speed if active else row[at.DRUM_SPEED * lanes + j]
         row[(at.WINCH + 4) * lanes + j] = error if active else error0
         row[at.TENSION * lanes + j] = force if active else row[at.TENSION * lanes + j]
-        charge(row, x3, v3, z3, u3, h if active else 0.0, lanes, j)
+        add_cost(row, x.z, v.z, z.z, u.z, h if active else 0.0, lanes, j)
 
 
 @scalar
-def charge(row: Array, z0: float, v0: float, z1: float, v1: float, h: float, lanes: int, j: int) -> None:
+def add_cost(row: Array, z0: float, v0: float, z1: float, v1: float, h: float, lanes: int, j: int) -> None:
     """Add an inner step of length h [s] to Ω1, Ω2 and the rope's peak: Simpson's rule, the middle on the cubic."""
     target = row[at.TARGET * lanes + j]
     e0, e1, middle = z0 - target, z1 - target, 0.5 * (z0 + z1) + 0.125 * h * (v0 - v1) - target
@@ -110,7 +120,7 @@ def charge(row: Array, z0: float, v0: float, z1: float, v1: float, h: float, lan
 
 
 @scalar
-def activate(row: Array, frame: Array, line: float, index: int, lanes: int) -> bool:
+def mark_active(row: Array, frame: Array, line: float, index: int, lanes: int) -> bool:
     """Mark the rows of the frame in that line of the tables that have an inner step ``index``; whether any has."""
     found = 0.0
     for j in range(lanes):
@@ -138,10 +148,10 @@ def control_step(
         for index in range(int(most)):
             deck_at(row, frame, index, lanes)
             for line in range(tables.shape[0]):
-                if activate(row, frame, line, index, lanes):
-                    predict(frame, tables[line], lanes)
-                    pull(row, frame, tables[line], index, lanes)
-                    finish(frame, tables[line], lanes)
+                if mark_active(row, frame, line, index, lanes):
+                    newmark_predict(frame, tables[line], lanes)
+                    step_rope_and_load(row, frame, tables[line], index, lanes)
+                    newmark_correct(frame, tables[line], lanes)
     for j in range(lanes):
         row[at.OMEGA1 * lanes + j] += row[at.STEP_COST * lanes + j]
 

@@ -54,8 +54,8 @@ def step_table(frame: Frame, division: Division, modes: int | None, step: float)
 
     head = np.zeros(at.HEAD)
     head[at.COUNT], head[at.CARRIED_COUNT], head[at.COUPLED], head[at.STEP] = count, carried, coupled, step
-    head[at.GIVE : at.GIVE + 9] = ((pulley * late) @ response).ravel()
-    head[at.GIVE_RATE : at.GIVE_RATE + 9] = (0.5 * step * pulley @ response).ravel()
+    head[at.COMPLIANCE : at.COMPLIANCE + 9] = ((pulley * late) @ response).ravel()
+    head[at.COMPLIANCE_RATE : at.COMPLIANCE_RATE + 9] = (0.5 * step * pulley @ response).ravel()
     head[at.REST : at.REST + 9] = ((pulley / modal.square) @ pulley.T).ravel()
 
     of_modes = np.zeros((count, at.MODE_SIZE))

@@ -1,4 +1,4 @@
-"""Reading successive slots of one lane."""
+"""Successive slots of one lane, read and written."""
 
 from __future__ import annotations
 
@@ -6,14 +6,23 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics.compiling import scalar
+from aframe_env.dynamics.vector import Vector
 
 Array = npt.NDArray[np.float64]
 
 
 @scalar
-def three(block: Array, slot: int, lanes: int, j: int) -> tuple[float, float, float]:
+def three(block: Array, slot: int, lanes: int, j: int) -> Vector:
     """Three successive slots of lane j."""
-    return block[slot * lanes + j], block[(slot + 1) * lanes + j], block[(slot + 2) * lanes + j]
+    return Vector(block[slot * lanes + j], block[(slot + 1) * lanes + j], block[(slot + 2) * lanes + j])
+
+
+@scalar
+def put_three(block: Array, slot: int, lanes: int, j: int, vector: Vector) -> None:
+    """Write three successive slots of lane j."""
+    block[slot * lanes + j] = vector.x
+    block[(slot + 1) * lanes + j] = vector.y
+    block[(slot + 2) * lanes + j] = vector.z
 
 
 @scalar
