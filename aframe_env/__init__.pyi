@@ -1,12 +1,13 @@
-from .crane import Crane, Frame, Rope, Winch
-from .motion import Harmonic, HarmonicMotion
-from .record import RecordedMotion
-from .scenario import Scenario, ScenarioDistribution
-from .scenario_file import read_scenario, scenario_text
-from .sea import Sea, SeaMotion
-from .sensors import Channel, Sensors
+from .scenario.crane import Crane, Frame, Rope, Winch
+from .scenario.distribution import ScenarioDistribution
+from .scenario.file import read_scenario, scenario_text
+from .scenario.motion import Harmonic, HarmonicMotion
+from .scenario.recorded_motion import RecordedMotion
+from .scenario.scenario import Scenario
+from .scenario.sea import Sea, SeaMotion
+from .scenario.sensors import Channel, Sensors
+from .scenario.vessel import Vessel
 from .validation import InvalidValue, SmallRotationWarning
-from .vessel import Vessel
 
 ENV_ID: str
 

@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.knots import knot_kernels
 from aframe_env.dynamics.start import hang_load, inner_steps, longest_inner_step, write_lift
 from aframe_env.dynamics.step import step_kernels
-from aframe_env.motion import Components, ShipMotion, TabledMotion, has_components
+from aframe_env.dynamics.wave_components import component_kernels
 from aframe_env.scenario import Scenario
+from aframe_env.scenario.motion import Components, ShipMotion, TabledMotion, has_components
 from aframe_env.validation import InvalidValue, require_integer, require_number
 
 FloatArray = npt.NDArray[np.float64]
@@ -154,7 +154,7 @@ class Engine:
         if has_components(motion):
             components = motion.components()
             record, record_length = -1, 0
-            segments = self._knot_segments(scenario, components, times)
+            segments = self._node_segments(scenario, components, times)
         else:
             components = Components(np.zeros(0), np.zeros((0, 6), dtype=np.complex128))
             record, record_length = self._record(motion, times.segment)
@@ -163,8 +163,8 @@ class Engine:
         row = np.zeros(at.slots(self._components))
         _fill_parameters(row, scenario, times)
         row[at.RECORD], row[at.RECORD_LENGTH] = record, record_length
-        row[at.KNOT_SEGMENTS] = segments
-        knot_kernels().write(row, components.frequency, components.response, segments * times.segment)
+        row[at.NODE_SEGMENTS] = segments
+        component_kernels().write(row, components.frequency, components.response, segments * times.segment)
         self._kernels_of_one.start(row[None], self._components, self._records)
         hang_load(row, 1, 0, scenario.initial == "comoving")
         self._kernels_of_one.start(row[None], self._components, self._records)
@@ -180,9 +180,9 @@ class Engine:
     def _timing(self, scenario: Scenario) -> Timing:
         return timing(scenario, self.control_period, self._max_inner_step)
 
-    def _knot_segments(self, scenario: Scenario, components: Components, times: Timing) -> int:
-        """Motion segments between two knots of a scenario's motion: a power of two."""
-        return knot_kernels().segments(
+    def _node_segments(self, scenario: Scenario, components: Components, times: Timing) -> int:
+        """Motion segments between two nodes of a scenario's motion: a power of two."""
+        return component_kernels().segments(
             components.frequency,
             components.response,
             scenario.crane.pulley_position,

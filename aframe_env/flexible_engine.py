@@ -7,18 +7,18 @@ from typing import Final
 
 import numpy as np
 
-from aframe_env.crane import Frame
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.flexible import layout as flex
-from aframe_env.dynamics.flexible.readout import READOUTS, readout_kernel, readout_table
-from aframe_env.dynamics.flexible.reduction import STATIC_SHAPES
+from aframe_env.dynamics.flexible.readout import READOUTS, readout_kernel
 from aframe_env.dynamics.flexible.step import flexible_kernels
-from aframe_env.dynamics.flexible.tables import step_table
-from aframe_env.dynamics.rfem.chain import Division
 from aframe_env.dynamics.start import inner_steps
 from aframe_env.engine import Engine, FloatArray, Timing
-from aframe_env.motion import Components
+from aframe_env.rfem.reduction import STATIC_SHAPES
+from aframe_env.rfem.structure import Division
+from aframe_env.rfem.tables import readout_table, step_table
 from aframe_env.scenario import Scenario
+from aframe_env.scenario.crane import Frame
+from aframe_env.scenario.motion import Components
 from aframe_env.validation import InvalidValue, require_integer
 
 FLEXIBLE_STEP: Final = 0.0125
@@ -105,7 +105,7 @@ class FlexibleEngine(Engine):
         flexible_kernels(1).start(row[None], frame[None], self._tables, comoving)
         return np.concatenate([frame, row])
 
-    def _knot_segments(self, scenario: Scenario, components: Components, times: Timing) -> int:
+    def _node_segments(self, scenario: Scenario, components: Components, times: Timing) -> int:
         """One: the frame feels the deck's acceleration, which the quintics give less exactly than its place."""
         return 1
 

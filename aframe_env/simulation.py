@@ -13,12 +13,12 @@ from gymnasium import spaces
 from aframe_env import task
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.flexible.readout import ROTATION
-from aframe_env.dynamics.rfem.model import warn_of_rotation
 from aframe_env.engine import Engine
 from aframe_env.flexible_engine import FlexibleEngine, Mesh, mesh_of
-from aframe_env.motion import require_coverage
+from aframe_env.rfem.model import warn_of_rotation
 from aframe_env.scenario import Scenario, ScenarioDistribution, ScenarioSource
-from aframe_env.sensors import SensorBank, Sensors
+from aframe_env.scenario.motion import require_coverage
+from aframe_env.scenario.sensors import SensorBank, Sensors
 from aframe_env.validation import InvalidValue, require_choice, require_number
 
 FloatArray = npt.NDArray[np.float64]

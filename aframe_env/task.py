@@ -15,7 +15,7 @@ from gymnasium import spaces
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.compiling import kernel, scalar
 from aframe_env.dynamics.flexible import readout
-from aframe_env.sensors import CHANNELS, Sensors
+from aframe_env.scenario.sensors import CHANNELS, Sensors
 
 Observation = Literal["state", "sensors"] | Sensors
 

@@ -10,9 +10,9 @@ import torch
 from gymnasium.error import DependencyNotInstalled
 
 from aframe_env import task
-from aframe_env.motion import require_coverage
-from aframe_env.random import episode_uniforms
+from aframe_env.dynamics.random import episode_uniforms
 from aframe_env.scenario import NUMBERS, Scenario, ScenarioSource
+from aframe_env.scenario.motion import require_coverage
 from aframe_env.simulation import Simulation
 from aframe_env.validation import InvalidValue, require_integer
 

@@ -22,9 +22,9 @@ from safetensors.numpy import load as load_arrays
 from safetensors.numpy import save as save_arrays
 from scipy.interpolate import RegularGridInterpolator
 
-from aframe_env.motion import Harmonic, HarmonicMotion
 from aframe_env.scenario import Scenario
-from aframe_env.structuring import strict_converter, structure
+from aframe_env.scenario.motion import Harmonic, HarmonicMotion
+from aframe_env.serialization import strict_converter, structure
 from aframe_env.validation import InvalidValue, require_number
 from agents.drives import RampedDrive
 from agents.heave import Harmonics

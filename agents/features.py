@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.crane import Crane
-from aframe_env.sensors import Sensors
+from aframe_env.scenario.crane import Crane
+from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE, Quantity
 from aframe_env.validation import InvalidValue
 from agents.control.observer import KalmanObserver

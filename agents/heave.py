@@ -13,8 +13,8 @@ from typing import Final
 import numpy as np
 from scipy.optimize import least_squares
 
-from aframe_env.motion import Components, Coordinate, has_components
 from aframe_env.scenario import Scenario
+from aframe_env.scenario.motion import Components, Coordinate, has_components
 from aframe_env.validation import InvalidValue, require_integer, require_number
 from agents.policy import FloatArray
 

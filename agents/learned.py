@@ -15,10 +15,10 @@ from safetensors import SafetensorError
 from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 
-from aframe_env.crane import Crane
 from aframe_env.scenario import Scenario
-from aframe_env.sensors import Sensors
-from aframe_env.structuring import strict_converter, structure
+from aframe_env.scenario.crane import Crane
+from aframe_env.scenario.sensors import Sensors
+from aframe_env.serialization import strict_converter, structure
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue
 from agents.features import Features, feature_names, features_for

@@ -21,8 +21,8 @@ from aframe_env.dynamics.compiling import kernel, scalar
 from aframe_env.dynamics.load import Load, RopeEnd, load_constants, rk4_step
 from aframe_env.dynamics.vector import Vector
 from aframe_env.engine import Engine
-from aframe_env.motion import require_coverage
 from aframe_env.scenario import Scenario
+from aframe_env.scenario.motion import require_coverage
 from aframe_env.validation import require_number
 from agents.drives import Drive
 

@@ -7,7 +7,7 @@ from functools import partial
 
 import torch
 
-from aframe_env.crane import GRAVITY, Crane
+from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.task import STATE
 from agents.control.winch import WinchModel
 from agents.features import LIMIT, STATE_FEATURES, coming_rise, of_the_state, wanted_turn

@@ -110,7 +110,7 @@ def copy_bandwidth(device: torch.device, size: int = 2**27) -> float:
 def bytes_moved(source: ScenarioDistribution) -> float:
     """Memory traffic of a step if each of a row's slots moved once: its own read and written, its waves' at knots."""
     engine, rng = Engine(1, PERIOD, source.components), np.random.default_rng(0)
-    knots = np.mean([1.0 / engine.row_vector(source.draw(rng))[at.KNOT_SEGMENTS] for _ in range(100)])
+    knots = np.mean([1.0 / engine.row_vector(source.draw(rng))[at.NODE_SEGMENTS] for _ in range(100)])
     waves = at.padded(source.components) * (at.COMPONENT_SLOTS + 2)  # the phases are written, too
     return float(8 * (2 * at.ROW_SLOTS + knots * waves))
 

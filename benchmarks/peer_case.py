@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from aframe_env import InvalidValue, Scenario
-from aframe_env.dynamics.rfem.chain import members_of
-from aframe_env.dynamics.rfem.constraints import luffing_rotation
-from aframe_env.motion import COORDINATES, HarmonicMotion
+from aframe_env.rfem.constraints import luffing_rotation
+from aframe_env.rfem.structure import members_of
+from aframe_env.scenario.motion import COORDINATES, HarmonicMotion
 
 
 def case_of(scenario: Scenario, mesh: tuple[int, int], duration: float, interval: float) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from aframe_env.structuring import strict_converter, structure
+from aframe_env.serialization import strict_converter, structure
 from aframe_env.validation import InvalidValue
 from train.output import versions, write_json
 

@@ -19,9 +19,9 @@ import aframe_env
 from aframe_env import InvalidValue, Scenario
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.flexible.readout import FEET, UTILISATION
-from aframe_env.dynamics.rfem.chain import Division
-from aframe_env.dynamics.rfem.dynamics import DynamicCase, simulate
 from aframe_env.flexible_engine import FlexibleEngine, Mesh
+from aframe_env.rfem.simulate import DynamicCase, simulate
+from aframe_env.rfem.structure import Division
 from train.output import versions, write_json
 
 FloatArray = npt.NDArray[np.float64]

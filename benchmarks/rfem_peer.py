@@ -29,9 +29,9 @@ import numpy.typing as npt
 
 from aframe_env import InvalidValue, Scenario
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.rfem.chain import Division
-from aframe_env.dynamics.rfem.reference import time_series
 from aframe_env.flexible_engine import FlexibleEngine, Mesh
+from aframe_env.rfem.reference import time_series
+from aframe_env.rfem.structure import Division
 from benchmarks.peer_case import case_of
 from train.output import versions, write_json
 

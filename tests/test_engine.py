@@ -48,7 +48,7 @@ def test_row_is_the_same_alone_and_in_any_batch() -> None:
     scenarios = mixed_rows()
     assert timing(scenarios[2], 0.1).substeps > 10 * timing(scenarios[0], 0.1).substeps
     commands = np.random.default_rng(1).uniform(-4.0, 4.0, (100, len(scenarios)))
-    knots = [Engine(1, 0.1).row_vector(s)[at.KNOT_SEGMENTS] for s in scenarios]
+    knots = [Engine(1, 0.1).row_vector(s)[at.NODE_SEGMENTS] for s in scenarios]
     assert {1.0, 2.0, 4.0} <= set(knots)
     together = histories(scenarios, commands)
     for k, scenario in enumerate(scenarios):
@@ -79,6 +79,6 @@ def test_any_number_of_components(components: int) -> None:
     factor = np.arange(1, 21) * 0.1 / wide.ramp
     factor = factor**3 * (10 - 15 * factor + 6 * factor**2)
     knots = np.arange(3, 20, 4)
-    np.testing.assert_array_equal(together[knots, 1, at.KNOT_STEP], knots + 1)
-    got, want = together[knots, 1, at.KNOT : at.KNOT + 6], (factor[:, None] * exact[0])[knots]
+    np.testing.assert_array_equal(together[knots, 1, at.NODE_STEP], knots + 1)
+    got, want = together[knots, 1, at.NODE : at.NODE + 6], (factor[:, None] * exact[0])[knots]
     np.testing.assert_allclose(got, want, atol=1e-12)

@@ -13,12 +13,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from aframe_env import InvalidValue, Scenario, SmallRotationWarning
-from aframe_env.crane import Crane
-from aframe_env.dynamics.rfem.chain import Division
-from aframe_env.dynamics.rfem.model import frame_model
-from aframe_env.dynamics.rfem.statics import LoadCase
-from aframe_env.motion import HarmonicMotion
-from aframe_env.section import Material, Servomotor, reference_leg_section
+from aframe_env.rfem.model import frame_model
+from aframe_env.rfem.statics import LoadCase, static
+from aframe_env.rfem.structure import Division
+from aframe_env.scenario.crane import Crane
+from aframe_env.scenario.cross_sections import Material, Servomotor, reference_leg_section
+from aframe_env.scenario.motion import HarmonicMotion
 
 STILL = np.zeros(1, dtype=np.float32)
 MESH = {"model": "rfem", "rfes": (5, 2)}
@@ -57,7 +57,7 @@ def test_information_at_rest_is_that_of_statics():
     to_drum = np.array(Crane().drum_position) - np.array(Crane().pulley_position) - info["pulley_deflection"]
     force = 981e3 * (to_drum / np.linalg.norm(to_drum) - np.array([0.0, 0.0, 1.0]))
     case = LoadCase(own_weight=True, forces={"S": tuple(force.tolist())})
-    expected = Crane().static(case, model=frame_model(Crane().frame, Division(leg=5, beam=2)))
+    expected = static(Crane(), case, model=frame_model(Crane().frame, Division(leg=5, beam=2)))
     assert info["rope_tension"] == pytest.approx(981e3, rel=1e-9)
     assert info["pulley_deflection"] == pytest.approx(expected.displacement["S"], rel=1e-7, abs=1e-10)
     assert info["foot_reactions"][0] == pytest.approx(expected.reactions["A_R"], rel=1e-7)
@@ -118,7 +118,7 @@ def test_a_frame_that_turns_too_far_warns_once_with_the_figure():
     force = 981e3 * (to_drum / np.linalg.norm(to_drum) - np.array([0.0, 0.0, 1.0]))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SmallRotationWarning)
-        position = soft.crane.static(LoadCase(forces={"S": tuple(force.tolist())}), model=static).position
+        position = static(soft.crane, LoadCase(forces={"S": tuple(force.tolist())}), model=static).position
         largest = np.linalg.norm(position.reshape(-1, 6)[:, 3:], axis=1).max()
     scalar = gymnasium.make("AFrameHeave-v0", scenario=soft, **MESH)
     with pytest.warns(SmallRotationWarning, match=r"turned by 0\.\d+ rad") as caught:

@@ -16,7 +16,7 @@ from aframe_env.vector_env import AFrameHeaveVectorEnv
 
 pytest.importorskip("tensordict", reason='tensordict is not installed (extra "cuda")')
 
-from aframe_env.random import episode_uniforms
+from aframe_env.dynamics.random import episode_uniforms
 from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
 
 FRAGILE = Crane(rope=Rope(breaking_load=1.0e6))

@@ -12,7 +12,7 @@ import tomli_w
 import tyro
 from cattrs import Converter
 
-from aframe_env.structuring import strict_converter, structure, without_none
+from aframe_env.serialization import strict_converter, structure, without_none
 from aframe_env.validation import InvalidValue
 
 T = TypeVar("T")

@@ -20,7 +20,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from aframe_env.scenario import Initial, Scenario
-from aframe_env.scenario_file import read_scenario, scenario_text
+from aframe_env.scenario.file import read_scenario, scenario_text
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
 from agents.objectives import FINE_STEP, Objective, coarse_step
 from agents.optimisation import (

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from aframe_env.scenario import Scenario
-from aframe_env.sea import SeaMotion
+from aframe_env.scenario.sea import SeaMotion
 from agents.policy import FloatArray, Knowledge
 from train.comparison import reductions
 from train.held_out import Comparison

@@ -19,7 +19,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, configure
 
 from aframe_env import task
-from aframe_env.sensors import Sensors
+from aframe_env.scenario.sensors import Sensors
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
 from agents.features import feature_names
 from agents.learned import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, serialise

@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import Any, Generic, TypeVar
 
 from aframe_env.dynamics.compiling import source_digest
-from aframe_env.structuring import strict_converter, structure
+from aframe_env.serialization import strict_converter, structure
 from aframe_env.validation import InvalidValue
 
 Result = TypeVar("Result")

@@ -21,8 +21,8 @@ import numpy.typing as npt
 from rich.console import Console
 from rich.progress import track
 
+from aframe_env.scenario.vessel import COLUMNS, Vessel
 from aframe_env.validation import InvalidValue, require_integer, require_number
-from aframe_env.vessel import COLUMNS, Vessel
 from train.config import parse
 from train.output import new_file, user_errors, write_atomically, write_text
 

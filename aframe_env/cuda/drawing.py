@@ -1,6 +1,6 @@
 """Scenarios drawn on the device: what ``ScenarioDistribution`` and ``Engine.row_vector`` do for a row on the processor.
 
-Both take the same steps, with the same functions, from the same random numbers (``aframe_env.random``).
+Both take the same steps, with the same functions, from the same random numbers (``aframe_env.dynamics.random``).
 """
 
 from __future__ import annotations
@@ -11,17 +11,23 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env import sea
-from aframe_env.crane import GRAVITY
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics import start
 from aframe_env.dynamics.compiling import scalar
-from aframe_env.dynamics.knots import bend_bound, segments_between_knots, set_turning
 from aframe_env.dynamics.layout import Span
+from aframe_env.dynamics.random import draw_seed, uniform
 from aframe_env.dynamics.step import start_rows
-from aframe_env.dynamics.waves import draw_wave, respond, response_cell
-from aframe_env.random import draw_seed, uniform
-from aframe_env.scenario import SUBSTREAM, Range, ScenarioDistribution
+from aframe_env.dynamics.wave_components import (
+    draw_wave,
+    respond,
+    response_cell,
+    segments_between_nodes,
+    set_turning,
+    sixth_derivative_bound,
+)
+from aframe_env.scenario import Range, ScenarioDistribution, sea
+from aframe_env.scenario.crane import GRAVITY
+from aframe_env.scenario.distribution import SUBSTREAM
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -157,7 +163,7 @@ def draw_motion(
             row[(base + at.RESPONSE + dof) * lanes + j] = answer.real
             row[(base + at.RESPONSE + 6 + dof) * lanes + j] = answer.imag
         row[(base + at.FREQUENCY) * lanes + j] = frequency
-        bound += bend_bound(
+        bound += sixth_derivative_bound(
             frequency,
             modulus(row, lanes, j, base, 0),
             modulus(row, lanes, j, base, 1),
@@ -170,8 +176,8 @@ def draw_motion(
             z,
         )
     segment = row[at.CONTROL_PERIOD * lanes + j]
-    segments = segments_between_knots(bound, segment, limits[_RAMP])
-    row[at.KNOT_SEGMENTS * lanes + j] = segments
+    segments = segments_between_nodes(bound, segment, limits[_RAMP])
+    row[at.NODE_SEGMENTS * lanes + j] = segments
     for k in range(components):
         frequency = row[(at.ROW_SLOTS + k * at.COMPONENT_SLOTS + at.FREQUENCY) * lanes + j]
         set_turning(row, lanes, j, k, frequency, segments * segment)

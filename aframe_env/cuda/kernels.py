@@ -11,8 +11,8 @@ from numba import cuda
 from aframe_env.cuda.drawing import begin_episode, copy_row, draw_lift, draw_motion
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.layout import LANES, Span
+from aframe_env.dynamics.random import draw_seed
 from aframe_env.dynamics.step import control_step
-from aframe_env.random import draw_seed
 from aframe_env.scenario import NUMBERS
 from aframe_env.task import charge_parted, clip_row, read_out
 

@@ -15,8 +15,8 @@ from aframe_env.cuda.kernels import kernels
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.layout import LANES
 from aframe_env.engine import Engine
-from aframe_env.motion import has_components
 from aframe_env.scenario import Scenario, ScenarioDistribution, ScenarioSource
+from aframe_env.scenario.motion import has_components
 from aframe_env.simulation import Simulation
 
 

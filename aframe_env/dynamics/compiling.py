@@ -156,12 +156,11 @@ def smaller(a: float, b: float) -> float:
 
 @cache
 def source_digest() -> str:
-    """Digest of the sources of whatever compiled code calls: the physics, and the random numbers.
+    """Digest of the sources of whatever compiled code calls: this package.
 
     numba finds a cached kernel stale when the kernel's own file changes, not when a function that it calls does.
     """
     digest = hashlib.sha256()
-    physics = Path(__file__).parent
-    for path in sorted([*physics.rglob("*.py"), physics.parent / "random.py"]):
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()

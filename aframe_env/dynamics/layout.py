@@ -44,16 +44,16 @@ DRUM_SPEED: Final = _take(1)
 COMMAND: Final = _take(1)
 PULLEY: Final = _take(9)
 """Pulley S in the base frame: position, velocity, acceleration."""
-KNOT_STEP: Final = _take(1)
-"""Motion segments from the start to the next knot of the deck's motion."""
-KNOT: Final = _take(18)
-"""Deck at the next knot: six coordinates, their rates, their accelerations."""
-KNOT_PULLEY: Final = _take(9)
-"""Pulley at the next knot: position, velocity, acceleration."""
-KNOT_BEFORE: Final = _take(18)
-"""Deck at the knot before."""
+NODE_STEP: Final = _take(1)
+"""Motion segments from the start to the next node of the deck's motion."""
+NODE: Final = _take(18)
+"""Deck at the next node: six coordinates, their rates, their accelerations."""
+NODE_PULLEY: Final = _take(9)
+"""Pulley at the next node: position, velocity, acceleration."""
+NODE_BEFORE: Final = _take(18)
+"""Deck at the node before."""
 PATH: Final = _take(18)
-"""Quintic through the pulley's path from knot to knot: coefficients 0..5 for each axis (axis-major)."""
+"""Quintic through the pulley's path from node to node: coefficients 0..5 for each axis (axis-major)."""
 OMEGA1: Final = _take(1)
 OMEGA2: Final = _take(1)
 STEP_COST: Final = _take(1)
@@ -89,8 +89,8 @@ RAMP_RATE: Final = _take(1)
 RAMP_OFFSET: Final = _take(1)
 CONTROL_PERIOD: Final = _take(1)
 """Length of one motion segment (a control step, or an equal part of a long one)."""
-KNOT_SEGMENTS: Final = _take(1)
-"""Motion segments from knot to knot."""
+NODE_SEGMENTS: Final = _take(1)
+"""Motion segments from node to node."""
 SUBSTEPS: Final = _take(1)
 INNER_STEP: Final = _take(1)
 """CONTROL_PERIOD / SUBSTEPS."""
@@ -102,9 +102,9 @@ RECORD_LENGTH: Final = _take(1)
 
 # Scratch of one control step.
 DUE: Final = _take(1)
-"""1 where the row has come to its knot."""
+"""1 where the row has come to its node."""
 ELAPSED: Final = _take(1)
-"""Time from the knot before to the start of the segment."""
+"""Time from the node before to the start of the segment."""
 WINCH: Final = _take(7)
 """Plan of the winch: direction, ramp time, start of decay, first decaying half step, error, start angle, speed."""
 INVERSE_MASS: Final = _take(1)

@@ -1,8 +1,8 @@
 """Motion of the deck and of the pulley on it, over a block of rows.
 
-The waves are summed at knots, up to four motion segments apart: each component is a complex number of modulus one,
-turned by one constant factor from knot to knot, no sine in the loop. Rounding drifts by about 1e-16 a knot, 1e-12
-after ten hours. From knot to knot, T apart, deck and pulley follow the quintic through position, velocity and
+The waves are summed at nodes, up to four motion segments apart: each component is a complex number of modulus one,
+turned by one constant factor from node to node, no sine in the loop. Rounding drifts by about 1e-16 a node, 1e-12
+after ten hours. From node to node, T apart, deck and pulley follow the quintic through position, velocity and
 acceleration at both; for a component of amplitude A and frequency ω its error is at most A (ωT)^6 / 46080.
 """
 
@@ -39,7 +39,7 @@ def smooth_ramp(time: float, rate: float, offset: float) -> tuple[float, float, 
 
 @scalar
 def turn_components(row: Block, group: int, span: Span) -> None:
-    """Advance the phases of a group of UNROLL wave components to the next knot, in the lanes that are due."""
+    """Advance the phases of a group of UNROLL wave components to the next node, in the lanes that are due."""
     lanes = span.stride
     for k in range(group * at.UNROLL, (group + 1) * at.UNROLL):
         base = at.ROW_SLOTS + k * at.COMPONENT_SLOTS
@@ -65,14 +65,14 @@ def add_component(
 
 @scalar
 def sum_components(row: Block, components: int, span: Span) -> None:
-    """Turn the wave components and sum deck coordinates, rates and accelerations at the next knot, before the ramp.
+    """Turn the wave components and sum deck coordinates, rates and accelerations at the next node, before the ramp.
 
     UNROLL components and three coordinates at a time: the sums stay in registers meanwhile, the components in cache.
     """
     lanes = span.stride
     for i in range(18):
         for j in range(span.begin, span.end):
-            row[(at.KNOT + i) * lanes + j] = 0.0
+            row[(at.NODE + i) * lanes + j] = 0.0
     for group in range(components // at.UNROLL):
         turn_components(row, group, span)
         begin = at.ROW_SLOTS + group * at.UNROLL * at.COMPONENT_SLOTS
@@ -92,7 +92,7 @@ def sum_components(row: Block, components: int, span: Span) -> None:
                     p3, v3, a3 = add_component(
                         row[(real + 2) * lanes + j], row[(imaginary + 2) * lanes + j], re, im, w, p3, v3, a3
                     )
-                c = at.KNOT + first
+                c = at.NODE + first
                 row[c * lanes + j] += p1
                 row[(c + 1) * lanes + j] += p2
                 row[(c + 2) * lanes + j] += p3
@@ -106,7 +106,7 @@ def sum_components(row: Block, components: int, span: Span) -> None:
 
 @scalar
 def read_record(row: Block, records: npt.NDArray[np.float64], span: Span) -> None:
-    """Deck coordinates of rows that follow a recorded motion: the table's line at the next knot.
+    """Deck coordinates of rows that follow a recorded motion: the table's line at the next node.
 
     After the last line the deck stands still where that line has it.
     """
@@ -114,60 +114,60 @@ def read_record(row: Block, records: npt.NDArray[np.float64], span: Span) -> Non
     for j in range(span.begin, span.end):
         first = int(row[at.RECORD * lanes + j])
         if first >= 0:
-            line = int(row[at.KNOT_STEP * lanes + j])
+            line = int(row[at.NODE_STEP * lanes + j])
             last = int(row[at.RECORD_LENGTH * lanes + j]) - 1
             moving = 1.0 if line <= last else 0.0
             line = line if line < last else last
             for i in range(6):
-                row[(at.KNOT + i) * lanes + j] = records[first + line, i]
+                row[(at.NODE + i) * lanes + j] = records[first + line, i]
             for i in range(6, 18):
-                row[(at.KNOT + i) * lanes + j] = moving * records[first + line, i]
+                row[(at.NODE + i) * lanes + j] = moving * records[first + line, i]
 
 
 @scalar
 def place_pulley(row: Block, span: Span) -> None:
-    """Apply the ramp to the deck's motion, and carry the pulley with the deck, eq. (38), at the next knot."""
+    """Apply the ramp to the deck's motion, and carry the pulley with the deck, eq. (38), at the next node."""
     lanes = span.stride
     for j in range(span.begin, span.end):
-        time = row[at.KNOT_STEP * lanes + j] * row[at.CONTROL_PERIOD * lanes + j]
+        time = row[at.NODE_STEP * lanes + j] * row[at.CONTROL_PERIOD * lanes + j]
         r, dr, ddr = smooth_ramp(time, row[at.RAMP_RATE * lanes + j], row[at.RAMP_OFFSET * lanes + j])
         for dof in range(6):
-            q = row[(at.KNOT + dof) * lanes + j]
-            dq = row[(at.KNOT + 6 + dof) * lanes + j]
-            row[(at.KNOT + dof) * lanes + j] = r * q
-            row[(at.KNOT + 6 + dof) * lanes + j] = r * dq + dr * q
-            row[(at.KNOT + 12 + dof) * lanes + j] = r * row[(at.KNOT + 12 + dof) * lanes + j] + 2.0 * dr * dq + ddr * q
+            q = row[(at.NODE + dof) * lanes + j]
+            dq = row[(at.NODE + 6 + dof) * lanes + j]
+            row[(at.NODE + dof) * lanes + j] = r * q
+            row[(at.NODE + 6 + dof) * lanes + j] = r * dq + dr * q
+            row[(at.NODE + 12 + dof) * lanes + j] = r * row[(at.NODE + 12 + dof) * lanes + j] + 2.0 * dr * dq + ddr * q
     for j in range(span.begin, span.end):
         x = row[at.PULLEY_ON_DECK * lanes + j]
         y = row[(at.PULLEY_ON_DECK + 1) * lanes + j]
         z = row[(at.PULLEY_ON_DECK + 2) * lanes + j]
         angle, rate, acceleration = (
-            row[(at.KNOT + 3) * lanes + j],
-            row[(at.KNOT + 9) * lanes + j],
-            row[(at.KNOT + 15) * lanes + j],
+            row[(at.NODE + 3) * lanes + j],
+            row[(at.NODE + 9) * lanes + j],
+            row[(at.NODE + 15) * lanes + j],
         )
         y, z, dy, dz, ddy, ddz = rotate_pair(y, z, 0.0, 0.0, 0.0, 0.0, angle, rate, acceleration)
         angle, rate, acceleration = (
-            row[(at.KNOT + 4) * lanes + j],
-            row[(at.KNOT + 10) * lanes + j],
-            row[(at.KNOT + 16) * lanes + j],
+            row[(at.NODE + 4) * lanes + j],
+            row[(at.NODE + 10) * lanes + j],
+            row[(at.NODE + 16) * lanes + j],
         )
         z, x, dz, dx, ddz, ddx = rotate_pair(z, x, dz, 0.0, ddz, 0.0, angle, rate, acceleration)
         angle, rate, acceleration = (
-            row[(at.KNOT + 5) * lanes + j],
-            row[(at.KNOT + 11) * lanes + j],
-            row[(at.KNOT + 17) * lanes + j],
+            row[(at.NODE + 5) * lanes + j],
+            row[(at.NODE + 11) * lanes + j],
+            row[(at.NODE + 17) * lanes + j],
         )
         x, y, dx, dy, ddx, ddy = rotate_pair(x, y, dx, dy, ddx, ddy, angle, rate, acceleration)
-        row[at.KNOT_PULLEY * lanes + j] = x + row[at.KNOT * lanes + j]
-        row[(at.KNOT_PULLEY + 1) * lanes + j] = y + row[(at.KNOT + 1) * lanes + j]
-        row[(at.KNOT_PULLEY + 2) * lanes + j] = z + row[(at.KNOT + 2) * lanes + j]
-        row[(at.KNOT_PULLEY + 3) * lanes + j] = dx + row[(at.KNOT + 6) * lanes + j]
-        row[(at.KNOT_PULLEY + 4) * lanes + j] = dy + row[(at.KNOT + 7) * lanes + j]
-        row[(at.KNOT_PULLEY + 5) * lanes + j] = dz + row[(at.KNOT + 8) * lanes + j]
-        row[(at.KNOT_PULLEY + 6) * lanes + j] = ddx + row[(at.KNOT + 12) * lanes + j]
-        row[(at.KNOT_PULLEY + 7) * lanes + j] = ddy + row[(at.KNOT + 13) * lanes + j]
-        row[(at.KNOT_PULLEY + 8) * lanes + j] = ddz + row[(at.KNOT + 14) * lanes + j]
+        row[at.NODE_PULLEY * lanes + j] = x + row[at.NODE * lanes + j]
+        row[(at.NODE_PULLEY + 1) * lanes + j] = y + row[(at.NODE + 1) * lanes + j]
+        row[(at.NODE_PULLEY + 2) * lanes + j] = z + row[(at.NODE + 2) * lanes + j]
+        row[(at.NODE_PULLEY + 3) * lanes + j] = dx + row[(at.NODE + 6) * lanes + j]
+        row[(at.NODE_PULLEY + 4) * lanes + j] = dy + row[(at.NODE + 7) * lanes + j]
+        row[(at.NODE_PULLEY + 5) * lanes + j] = dz + row[(at.NODE + 8) * lanes + j]
+        row[(at.NODE_PULLEY + 6) * lanes + j] = ddx + row[(at.NODE + 12) * lanes + j]
+        row[(at.NODE_PULLEY + 7) * lanes + j] = ddy + row[(at.NODE + 13) * lanes + j]
+        row[(at.NODE_PULLEY + 8) * lanes + j] = ddz + row[(at.NODE + 14) * lanes + j]
 
 
 @scalar
@@ -213,7 +213,7 @@ def second_derivative(c2: float, c3: float, c4: float, c5: float, t: float) -> f
 
 @scalar
 def on_path(row: Block, axis: int, t: float, lanes: int, j: int) -> tuple[float, float]:
-    """Position and velocity of lane j's pulley along an axis, ``t`` s after the knot before."""
+    """Position and velocity of lane j's pulley along an axis, ``t`` s after the node before."""
     c = at.PATH + 6 * axis
     return on_quintic(
         row[c * lanes + j],
@@ -228,7 +228,7 @@ def on_path(row: Block, axis: int, t: float, lanes: int, j: int) -> tuple[float,
 
 @scalar
 def pulley_on_path(row: Block, t: float, lanes: int, j: int) -> tuple[Vector, Vector]:
-    """Position and velocity of lane j's pulley, ``t`` s after the knot before."""
+    """Position and velocity of lane j's pulley, ``t`` s after the node before."""
     x, u = on_path(row, 0, t, lanes, j)
     y, v = on_path(row, 1, t, lanes, j)
     z, w = on_path(row, 2, t, lanes, j)
@@ -237,7 +237,7 @@ def pulley_on_path(row: Block, t: float, lanes: int, j: int) -> tuple[Vector, Ve
 
 @scalar
 def lay_path(row: Block, span: Span) -> None:
-    """Lay the quintics through the pulley's path up to the next knot, in the lanes that are due."""
+    """Lay the quintics through the pulley's path up to the next node, in the lanes that are due."""
     lanes = span.stride
     for axis in range(3):
         c, p = at.PATH + 6 * axis, at.PULLEY + axis
@@ -247,18 +247,18 @@ def lay_path(row: Block, span: Span) -> None:
                 row[p * lanes + j],
                 row[(p + 3) * lanes + j],
                 row[(p + 6) * lanes + j],
-                row[(at.KNOT_PULLEY + axis) * lanes + j],
-                row[(at.KNOT_PULLEY + 3 + axis) * lanes + j],
-                row[(at.KNOT_PULLEY + 6 + axis) * lanes + j],
-                row[at.KNOT_SEGMENTS * lanes + j] * row[at.CONTROL_PERIOD * lanes + j],
+                row[(at.NODE_PULLEY + axis) * lanes + j],
+                row[(at.NODE_PULLEY + 3 + axis) * lanes + j],
+                row[(at.NODE_PULLEY + 6 + axis) * lanes + j],
+                row[at.NODE_SEGMENTS * lanes + j] * row[at.CONTROL_PERIOD * lanes + j],
             )
             for i in range(6):
                 row[(c + i) * lanes + j] = new[i] if due else row[(c + i) * lanes + j]
 
 
 @scalar
-def pose_knot(row: Block, components: int, records: npt.NDArray[np.float64], span: Span) -> None:
-    """Deck and pulley at the next knot, from the components (or the record)."""
+def pose_node(row: Block, components: int, records: npt.NDArray[np.float64], span: Span) -> None:
+    """Deck and pulley at the next node, from the components (or the record)."""
     sum_components(row, components, span)
     if records.shape[0] > 0:
         read_record(row, records, span)
@@ -267,39 +267,39 @@ def pose_knot(row: Block, components: int, records: npt.NDArray[np.float64], spa
 
 @scalar
 def start_motion(row: Block, components: int, records: npt.NDArray[np.float64], span: Span) -> None:
-    """Deck and pulley at the start, which is the first knot."""
+    """Deck and pulley at the start, which is the first node."""
     lanes = span.stride
-    pose_knot(row, components, records, span)
+    pose_node(row, components, records, span)
     for i in range(18):
         for j in range(span.begin, span.end):
-            row[(at.KNOT_BEFORE + i) * lanes + j] = row[(at.KNOT + i) * lanes + j]
-    meet_knot(row, span)
+            row[(at.NODE_BEFORE + i) * lanes + j] = row[(at.NODE + i) * lanes + j]
+    meet_node(row, span)
 
 
 @scalar
-def meet_knot(row: Block, span: Span) -> None:
-    """Put the pulley where it is at the knot."""
+def meet_node(row: Block, span: Span) -> None:
+    """Put the pulley where it is at the node."""
     lanes = span.stride
     for i in range(9):
         for j in range(span.begin, span.end):
-            row[(at.PULLEY + i) * lanes + j] = row[(at.KNOT_PULLEY + i) * lanes + j]
+            row[(at.PULLEY + i) * lanes + j] = row[(at.NODE_PULLEY + i) * lanes + j]
 
 
 @scalar
-def go_on(row: Block, components: int, records: npt.NDArray[np.float64], span: Span) -> None:
-    """Go on to the next knot in the lanes that are due, and lay the path there."""
+def go_to_next_node(row: Block, components: int, records: npt.NDArray[np.float64], span: Span) -> None:
+    """Go on to the next node in the lanes that are due, and lay the path there."""
     lanes = span.stride
     for i in range(18):
         for j in range(span.begin, span.end):
-            before, knot = row[(at.KNOT_BEFORE + i) * lanes + j], row[(at.KNOT + i) * lanes + j]
-            row[(at.KNOT_BEFORE + i) * lanes + j] = knot if row[at.DUE * lanes + j] > 0.0 else before
-    pose_knot(row, components, records, span)
+            before, node = row[(at.NODE_BEFORE + i) * lanes + j], row[(at.NODE + i) * lanes + j]
+            row[(at.NODE_BEFORE + i) * lanes + j] = node if row[at.DUE * lanes + j] > 0.0 else before
+    pose_node(row, components, records, span)
     lay_path(row, span)
 
 
 @scalar
 def advance_motion(row: Block, components: int, records: npt.NDArray[np.float64], span: Span) -> None:
-    """Begin a motion segment: where a row has come to its knot, go on to the next.
+    """Begin a motion segment: where a row has come to its node, go on to the next.
 
     Where many rows of a block are due all of them go through it, those that are not to the numbers that they have;
     where few are, each goes alone.
@@ -307,19 +307,19 @@ def advance_motion(row: Block, components: int, records: npt.NDArray[np.float64]
     lanes = span.stride
     due = 0.0
     for j in range(span.begin, span.end):
-        own = 1.0 if row[at.STEP * lanes + j] == row[at.KNOT_STEP * lanes + j] else 0.0
+        own = 1.0 if row[at.STEP * lanes + j] == row[at.NODE_STEP * lanes + j] else 0.0
         row[at.DUE * lanes + j] = own
-        row[at.KNOT_STEP * lanes + j] += own * row[at.KNOT_SEGMENTS * lanes + j]
+        row[at.NODE_STEP * lanes + j] += own * row[at.NODE_SEGMENTS * lanes + j]
         due += own
     if due > FEW:
-        go_on(row, components, records, span)
+        go_to_next_node(row, components, records, span)
     elif due > 0.0:
         for j in range(span.begin, span.end):
             if row[at.DUE * lanes + j] > 0.0:
-                go_on(row, components, records, Span(lanes, j, j + 1))
+                go_to_next_node(row, components, records, Span(lanes, j, j + 1))
     for j in range(span.begin, span.end):
-        since_knot = row[at.STEP * lanes + j] - row[at.KNOT_STEP * lanes + j] + row[at.KNOT_SEGMENTS * lanes + j]
-        row[at.ELAPSED * lanes + j] = since_knot * row[at.CONTROL_PERIOD * lanes + j]
+        since_node = row[at.STEP * lanes + j] - row[at.NODE_STEP * lanes + j] + row[at.NODE_SEGMENTS * lanes + j]
+        row[at.ELAPSED * lanes + j] = since_node * row[at.CONTROL_PERIOD * lanes + j]
         row[at.STEP * lanes + j] += 1.0
         row[at.TIME * lanes + j] = row[at.STEP * lanes + j] * row[at.CONTROL_PERIOD * lanes + j]
 
@@ -343,15 +343,15 @@ def end_motion(row: Block, span: Span) -> None:
 @scalar
 def deck_coordinate(row: Block, dof: int, lanes: int, j: int) -> float:
     """Coordinate ``dof`` of lane j's deck at the row's time."""
-    period, segments = row[at.CONTROL_PERIOD * lanes + j], row[at.KNOT_SEGMENTS * lanes + j]
-    elapsed = (row[at.STEP * lanes + j] - row[at.KNOT_STEP * lanes + j] + segments) * period
+    period, segments = row[at.CONTROL_PERIOD * lanes + j], row[at.NODE_SEGMENTS * lanes + j]
+    elapsed = (row[at.STEP * lanes + j] - row[at.NODE_STEP * lanes + j] + segments) * period
     c = quintic(
-        row[(at.KNOT_BEFORE + dof) * lanes + j],
-        row[(at.KNOT_BEFORE + 6 + dof) * lanes + j],
-        row[(at.KNOT_BEFORE + 12 + dof) * lanes + j],
-        row[(at.KNOT + dof) * lanes + j],
-        row[(at.KNOT + 6 + dof) * lanes + j],
-        row[(at.KNOT + 12 + dof) * lanes + j],
+        row[(at.NODE_BEFORE + dof) * lanes + j],
+        row[(at.NODE_BEFORE + 6 + dof) * lanes + j],
+        row[(at.NODE_BEFORE + 12 + dof) * lanes + j],
+        row[(at.NODE + dof) * lanes + j],
+        row[(at.NODE + 6 + dof) * lanes + j],
+        row[(at.NODE + 12 + dof) * lanes + j],
         segments * period,
     )
     return on_quintic(*c, elapsed)[0]

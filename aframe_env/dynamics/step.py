@@ -106,9 +106,9 @@ def inner_step(row: Array, index: int, span: Span) -> None:
         row[at.STIFFNESS * lanes + j] = stiffness2
         parted, target = row[at.PARTED * lanes + j], row[at.TARGET * lanes + j]
         intact = 1.0 - parted
-        since_knot = row[at.ELAPSED * lanes + j]
-        pulley1, pulley_rate1 = pulley_on_path(row, since_knot + middle, lanes, j)
-        pulley2, pulley_rate2 = pulley_on_path(row, since_knot + end, lanes, j)
+        since_node = row[at.ELAPSED * lanes + j]
+        pulley1, pulley_rate1 = pulley_on_path(row, since_node + middle, lanes, j)
+        pulley2, pulley_rate2 = pulley_on_path(row, since_node + end, lanes, j)
         pulley0, pulley_rate0 = three(row, at.PULLEY, lanes, j), three(row, at.PULLEY + 3, lanes, j)
         load, cost, peak = rk4_step(
             Load(three(row, at.LOAD_POSITION, lanes, j), three(row, at.LOAD_VELOCITY, lanes, j)),

@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env import task
-from aframe_env.crane import Crane
 from aframe_env.dynamics import layout as at
-from aframe_env.motion import HarmonicMotion, ShipMotion, is_tabled
 from aframe_env.rendering.water import Water, water_of
-from aframe_env.sea import SeaMotion
+from aframe_env.scenario.crane import Crane
+from aframe_env.scenario.motion import HarmonicMotion, ShipMotion, is_tabled
+from aframe_env.scenario.sea import SeaMotion
 from aframe_env.simulation import Simulation
 
 FloatArray = npt.NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.scenario import Scenario
-from aframe_env.sea import SeaMotion
+from aframe_env.scenario.sea import SeaMotion
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aframe_env.scenario import Scenario
-from aframe_env.sensors import Sensors
+from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import require_number
 from agents.control.observer import PolynomialObserver

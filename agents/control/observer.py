@@ -6,8 +6,8 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from aframe_env.crane import GRAVITY
-from aframe_env.sensors import Sensors
+from aframe_env.scenario.crane import GRAVITY
+from aframe_env.scenario.sensors import Sensors
 from agents.control.regulator import Columns, Lifts
 from agents.estimation import ALL, DRUM_RADIUS, Estimator, FloatArray, Readings, Rows
 from agents.kalman import RopeFilter, WaveBank, WaveFilter

@@ -15,7 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from aframe_env.scenario import Scenario
-from aframe_env.sensors import Sensors
+from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED
 from aframe_env.validation import InvalidValue, require_integer, require_number
 from agents.control.observer import KalmanObserver

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.crane import GRAVITY, Crane
+from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.task import Quantity
 from aframe_env.validation import InvalidValue, require_number
 from agents.control.rope import RopeModel

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aframe_env.crane import Crane
 from aframe_env.dynamics.compiling import kernel, scalar
 from aframe_env.dynamics.winch import drum_state, plan
+from aframe_env.scenario.crane import Crane
 from agents.estimation import ALL, FloatArray, Rows
 
 _BISECTIONS = 48  # a hair of the speed range: below 1e-13 rad/s

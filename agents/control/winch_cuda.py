@@ -8,8 +8,8 @@ from typing import Any
 import torch
 from numba import cuda
 
-from aframe_env.crane import Winch
 from aframe_env.cuda.device import stream, view
+from aframe_env.scenario.crane import Winch
 from agents.control.winch import command_for
 
 _THREADS = 128

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from aframe_env import Crane, Harmonic, HarmonicMotion, Rope, Scenario, Winch
 from aframe_env.dynamics import layout as at
 from aframe_env.engine import Engine
-from aframe_env.motion import Components
+from aframe_env.scenario.motion import Components
 from benchmarks.limit.library import Limit
 from benchmarks.peers.serve import Measurement, cores, serve, speed
 

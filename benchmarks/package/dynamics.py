@@ -8,7 +8,7 @@ import numpy as np
 
 from aframe_env import Scenario
 from aframe_env.engine import Engine
-from aframe_env.motion import Components, HarmonicMotion, ShipMotion
+from aframe_env.scenario.motion import Components, HarmonicMotion, ShipMotion
 from benchmarks.peers import synthetic
 from benchmarks.peers.serve import Measurement, serve, speed
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from aframe_env import Crane, HarmonicMotion, Scenario, ScenarioDistribution
-from aframe_env.sensors import Sensors
+from aframe_env.scenario.sensors import Sensors
 from aframe_env.simulation import Simulation
 from agents.features import AUTHORITY, LIMIT, SENSED_FEATURES, STATE_FEATURES, features_for
 

@@ -6,7 +6,7 @@ import torch
 
 from aframe_env import InvalidValue, ScenarioDistribution
 from aframe_env.env import AFrameHeaveEnv
-from aframe_env.sensors import Sensors
+from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
 from agents.features import feature_names
 from agents.learned import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, load, serialise

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
 from aframe_env import Scenario
-from aframe_env.motion import Components
+from aframe_env.scenario.motion import Components
 
 FloatArray = npt.NDArray[np.float64]
 Drum = Callable[[float], tuple[float, float]]

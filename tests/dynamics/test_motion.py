@@ -8,8 +8,8 @@ import pytest
 
 from aframe_env import Harmonic, HarmonicMotion, Scenario, Sea, SeaMotion
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.knots import PATH_ERROR
 from aframe_env.dynamics.motion import on_quintic, quintic, smooth_ramp
+from aframe_env.dynamics.wave_components import PATH_ERROR
 from aframe_env.engine import Engine
 
 
@@ -31,7 +31,7 @@ def test_no_ramp() -> None:
 def test_ramped_start_is_at_rest() -> None:
     engine = Engine(1, 0.1)
     engine.reset_row(0, Scenario(motion=SeaMotion(sea=Sea(hs=4.0, tp=8.0, seed=1)), ramp=10.0))
-    assert engine.read_many(at.KNOT, 18)[0] == pytest.approx(np.zeros(18), abs=1e-15)
+    assert engine.read_many(at.NODE, 18)[0] == pytest.approx(np.zeros(18), abs=1e-15)
     assert engine.read_many(at.LOAD_VELOCITY, 3)[0] == pytest.approx(np.zeros(3), abs=1e-15)
 
 
@@ -63,7 +63,7 @@ def test_phases_do_not_drift() -> None:
     for _ in range(100_000):
         engine.step(command)
     want = motion.components().at(100_000 * 0.1)[:, 0].reshape(-1)
-    assert np.abs(engine.read_many(at.KNOT, 18)[0] - want).max() < 1e-9
+    assert np.abs(engine.read_many(at.NODE, 18)[0] - want).max() < 1e-9
     assert np.abs(engine.deck()[0] - want[:6]).max() < 1e-9
     assert engine.read(at.TIME)[0] == pytest.approx(1e4, rel=1e-14)
 
@@ -107,7 +107,7 @@ def test_recorded_motion_is_that_of_its_components(period: float, ramp: float) -
     steps = round(60 / period)
     got, want = history(engine, 2, steps), history(twin, 0, steps)
     # A record has a knot at every line, the sea as few as PATH_ERROR allows; derivatives lose by the knots' distance.
-    interval = engine.read(at.KNOT_SEGMENTS)[0] * engine.read(at.CONTROL_PERIOD)[0]
+    interval = engine.read(at.NODE_SEGMENTS)[0] * engine.read(at.CONTROL_PERIOD)[0]
     tolerance = np.full(18, PATH_ERROR)
     tolerance[9:12] *= 8.0 / interval
     tolerance[12:15] *= 60.0 / interval**2

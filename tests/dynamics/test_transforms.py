@@ -16,7 +16,7 @@ from aframe_env import Crane, Scenario
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.transforms import rotate_pair, sine_cosine
 from aframe_env.engine import Engine
-from aframe_env.motion import Components
+from aframe_env.scenario.motion import Components
 
 
 def both(angles: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

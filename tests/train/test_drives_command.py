@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from aframe_env import Scenario
-from aframe_env.scenario_file import read_scenario, scenario_text
+from aframe_env.scenario.file import read_scenario, scenario_text
 from agents.drives import HarmonicDrive, SplineDrive
 from train import drives
 

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from aframe_env.dynamics.rfem.reference import static_cases, time_series
+from aframe_env.rfem.reference import static_cases, time_series
 from aframe_env.validation import InvalidValue
 from train.verification.cases import dynamic_case, release_case, static_case
 from train.verify import main

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from aframe_env.dynamics.rfem.dynamics import Drum, DynamicCase, PrescribedDrum, StillDrum, simulate
+from aframe_env.rfem.simulate import Drum, DynamicCase, PrescribedDrum, StillDrum, simulate
 from aframe_env.scenario import Scenario
 from agents.drives import Drive
 from agents.policy import FloatArray

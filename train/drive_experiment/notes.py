@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from aframe_env.crane import Winch
+from aframe_env.scenario.crane import Winch
 from agents.policy import FloatArray
 from train.drive_experiment.results import HEADINGS, Experiment, Result, demand
 

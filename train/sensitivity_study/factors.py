@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from aframe_env.motion import ComponentMotion, Components, has_components
 from aframe_env.scenario import Scenario
+from aframe_env.scenario.motion import ComponentMotion, Components, has_components
 from aframe_env.validation import InvalidValue
 
 

@@ -12,16 +12,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.crane import Crane, Frame
-from aframe_env.dynamics.rfem.chain import Division
-from aframe_env.dynamics.rfem.dynamics import DynamicCase, DynamicResult, simulate
-from aframe_env.dynamics.rfem.history import FrameHistory
-from aframe_env.dynamics.rfem.model import FrameModel, frame_model
-from aframe_env.dynamics.rfem.release import release
-from aframe_env.dynamics.rfem.statics import LOADED_POINTS, LoadCase, static
+from aframe_env.rfem.history import FrameHistory
+from aframe_env.rfem.model import FrameModel, frame_model
+from aframe_env.rfem.release import release
+from aframe_env.rfem.simulate import DynamicCase, DynamicResult, simulate
+from aframe_env.rfem.statics import LOADED_POINTS, LoadCase, static
+from aframe_env.rfem.structure import Division
 from aframe_env.scenario import Scenario
-from aframe_env.scenario_file import scenario_of
-from aframe_env.section import Servomotor
+from aframe_env.scenario.crane import Crane, Frame
+from aframe_env.scenario.cross_sections import Servomotor
+from aframe_env.scenario.file import scenario_of
 from aframe_env.validation import InvalidValue, require_choice, require_number
 
 FORMAT = """\

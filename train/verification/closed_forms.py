@@ -8,8 +8,8 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from aframe_env.dynamics.rfem.beam import Array, Member
-from aframe_env.dynamics.rfem.straight import End
+from aframe_env.rfem.beam import Array, Member
+from aframe_env.rfem.straight_beam import End
 
 _HELD = {"pinned": (0, 2), "clamped": (0, 1), "free": (2, 3)}
 """Which of deflection, slope, moment, shear force are zero at an end."""

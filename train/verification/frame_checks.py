@@ -9,14 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from aframe_env.crane import Crane
-from aframe_env.dynamics.rfem.beam import Array, Member
-from aframe_env.dynamics.rfem.chain import Division
-from aframe_env.dynamics.rfem.model import FrameModel, Layout, frame_model
-from aframe_env.dynamics.rfem.reference import natural_frequencies, static_cases
-from aframe_env.dynamics.rfem.statics import LoadCase
-from aframe_env.dynamics.rfem.straight import End, bending_frequencies
-from aframe_env.section import Material, reference_leg_section
+from aframe_env.rfem.beam import Array, Member
+from aframe_env.rfem.model import FrameModel, Layout, frame_model
+from aframe_env.rfem.modes import frame_modes
+from aframe_env.rfem.reference import natural_frequencies, static_cases
+from aframe_env.rfem.statics import LoadCase, static
+from aframe_env.rfem.straight_beam import End, bending_frequencies
+from aframe_env.rfem.structure import Division
+from aframe_env.scenario.crane import Crane
+from aframe_env.scenario.cross_sections import Material, reference_leg_section
 from train.verification.closed_forms import exact_frequencies
 from train.verification.report import Check, Row
 
@@ -140,7 +141,7 @@ def determinate_reactions() -> Check:
     worst = 0.0
     for division in ((5, 2), (20, 16)):
         for name, case in CASES.items():
-            here = flat(Crane().static(case, model=model(*division)).reference_case())
+            here = flat(static(Crane(), case, model=model(*division)).reference_case())
             target = flat(static_cases()[name])
             worst = max(worst, *(abs(here[key] / target[key] - 1.0) for key in DETERMINATE))
     return Check(
@@ -156,7 +157,7 @@ _VECTORS = ("u_S_D", "u_BR_D", "u_BL_D", "rot_S_D", "rot_BR_D", "rot_BL_D", "R_A
 
 def static_errors(frame: FrameModel, name: str) -> dict[str, float]:
     """Relative errors of a load case against the finite-element program."""
-    here, target = Crane().static(CASES[name], model=frame).reference_case(), static_cases()[name]
+    here, target = static(Crane(), CASES[name], model=frame).reference_case(), static_cases()[name]
     return {
         "deflection of S": vector_error(here, target, ("u_S_D",)),
         "deflection of S, worst component": max(
@@ -184,7 +185,7 @@ def static_frame() -> list[Check]:
         for name, case in CASES.items():
             errors = static_errors(frame, name)
             worst = max(worst, *errors.values())
-            result, target = Crane().static(case, model=frame).reference_case(), static_cases()[name]
+            result, target = static(Crane(), case, model=frame).reference_case(), static_cases()[name]
             here, there = flat(result), flat(target)
             for key in ("u_S_D.0", "u_S_D.2", "rot_BR_D.0", "rot_BR_D.1", "rot_BR_D.2", "R_AR_D.1"):
                 rows.append(_row(f"{name}: {key}", here[key], there[key]))
@@ -207,7 +208,7 @@ def _static_order() -> Check:
     reference = np.array(static_cases()["V"]["u_S_D"])
     rows, errors = [], []
     for division in ((5, 4), (10, 8), (20, 16), (40, 32)):
-        here = Crane().static(CASES["V"], model=model(*division)).displacement["S"]
+        here = static(Crane(), CASES["V"], model=model(*division)).displacement["S"]
         errors.append((here - reference)[[0, 2]] / reference[[0, 2]])
         rows.append(
             Row(
@@ -218,7 +219,7 @@ def _static_order() -> Check:
             )
         )
     orders = [order(a[k], b[k]) for a, b in pairwise(errors) for k in range(2)]
-    twin = Crane().static(CASES["V"], model=model(20, 20)).displacement["S"][0] * 1e3
+    twin = static(Crane(), CASES["V"], model=model(20, 20)).displacement["S"][0] * 1e3
     rows.append(_row("V, 20/20: u_S x, mm, against program B's equal mesh", float(twin), 24.7184))
     return Check(
         name="static frame: convergence",
@@ -232,7 +233,7 @@ def _static_order() -> Check:
 def natural_modes() -> Check:
     """First ten natural frequencies."""
     reference = natural_frequencies()
-    here: Array = Crane().modes(10, model=model(20, 16)).frequency
+    here: Array = frame_modes(Crane(), 10, model=model(20, 16)).frequency
     errors = here / reference - 1.0
     worst = float(np.max(np.abs(errors)))
     return Check(
@@ -256,8 +257,8 @@ def previous_model() -> Check:
         for layout in layouts:
             begin = time.perf_counter()
             frame = model(*division, layout=layout)
-            results[layout] = flat(Crane().static(CASES["L1"], model=frame).reference_case())
-            frequencies[layout] = Crane().modes(10, model=frame).frequency
+            results[layout] = flat(static(Crane(), CASES["L1"], model=frame).reference_case())
+            frequencies[layout] = frame_modes(Crane(), 10, model=frame).frequency
             seconds[layout] = time.perf_counter() - begin
             counts[layout] = frame.unknowns
         one, three = results["one_chain"], results["three_beams"]

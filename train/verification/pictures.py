@@ -10,10 +10,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from aframe_env.crane import Crane
-from aframe_env.dynamics.rfem.beam import Array
-from aframe_env.dynamics.rfem.model import FrameModel
-from aframe_env.dynamics.rfem.reference import natural_frequencies, static_cases, time_series
+from aframe_env.rfem.beam import Array
+from aframe_env.rfem.model import FrameModel
+from aframe_env.rfem.modes import frame_modes
+from aframe_env.rfem.reference import natural_frequencies, static_cases, time_series
+from aframe_env.rfem.statics import static
+from aframe_env.scenario.crane import Crane
 from train.output import write_atomically
 from train.verification.cases import dynamic_columns
 from train.verification.frame_checks import CASES, model
@@ -65,7 +67,7 @@ def deformed_frame() -> Figure:
     figure = Figure(figsize=(12, 9), layout="constrained")
     grid = figure.subplots(2, 3)
     for column, (name, case) in enumerate(CASES.items()):
-        result = Crane().static(case, model=frame)
+        result = static(Crane(), case, model=frame)
         factor = 800.0 if name == "G" else 80.0
         _views((grid[0, column], grid[1, column]), frame, result.position, factor)
         rest, deflection = np.array(Crane().pulley_position), np.array(static_cases()[name]["u_S_D"])
@@ -88,7 +90,7 @@ def moment_diagrams() -> Figure:
     grid = figure.subplots(3, 3, sharex=True)
     marks = {"NR": 4.8, "BR": 12.0, "S": 17.0, "BL": 22.0, "NL": 29.2}
     for column, (name, case) in enumerate(CASES.items()):
-        stations = Crane().static(case, model=frame).along()
+        stations = static(Crane(), case, model=frame).along()
         along = np.array([station.along for station in stations])
         forces = np.array([station.forces for station in stations])
         rows = ((4, "My", "M2 = My, kN m"), (5, "Mz", "M3 = Mz, kN m"), (0, "N", "N, kN"))
@@ -112,7 +114,7 @@ def moment_diagrams() -> Figure:
 def mode_shapes() -> Figure:
     """First eight mode shapes, 20/16 rfes."""
     frame = model(20, 16)
-    modes = Crane().modes(8, model=frame)
+    modes = frame_modes(Crane(), 8, model=frame)
     reference = natural_frequencies()
     figure = Figure(figsize=(13, 12), layout="constrained")
     grid = figure.subplots(4, 4)

@@ -7,14 +7,14 @@ from functools import cache
 
 import numpy as np
 
-from aframe_env.crane import Crane
-from aframe_env.dynamics.rfem.beam import Array
-from aframe_env.dynamics.rfem.dynamics import DynamicCase, DynamicResult, simulate
-from aframe_env.dynamics.rfem.energy import energy_balance
-from aframe_env.dynamics.rfem.reference import time_series
-from aframe_env.dynamics.rfem.release import release
-from aframe_env.motion import COORDINATES, Harmonic, HarmonicMotion
+from aframe_env.rfem.beam import Array
+from aframe_env.rfem.energy import energy_balance
+from aframe_env.rfem.reference import time_series
+from aframe_env.rfem.release import release
+from aframe_env.rfem.simulate import DynamicCase, DynamicResult, simulate
 from aframe_env.scenario import Scenario
+from aframe_env.scenario.crane import Crane
+from aframe_env.scenario.motion import COORDINATES, Harmonic, HarmonicMotion
 from train.verification.cases import columns_of, dynamic_columns
 from train.verification.frame_checks import CASES, model, order
 from train.verification.report import Check, Row

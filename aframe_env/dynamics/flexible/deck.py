@@ -9,7 +9,7 @@ from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.compiling import scalar
 from aframe_env.dynamics.flexible import layout as flex
 from aframe_env.dynamics.layout import Span
-from aframe_env.dynamics.motion import advance_motion, meet_knot, on_quintic, quintic, second_derivative
+from aframe_env.dynamics.motion import advance_motion, meet_node, on_quintic, quintic, second_derivative
 from aframe_env.dynamics.transforms import turn
 
 Block = npt.NDArray[np.float64]
@@ -17,18 +17,18 @@ Block = npt.NDArray[np.float64]
 
 @scalar
 def advance_deck(row: Block, frame: Block, components: int, records: Block, lanes: int) -> None:
-    """Advance the deck by one segment, which ends at a knot, and lay quintics through its six coordinates over it."""
+    """Advance the deck by one segment, which ends at a node, and lay quintics through its six coordinates over it."""
     advance_motion(row, components, records, Span(lanes, 0, lanes))
-    meet_knot(row, Span(lanes, 0, lanes))
+    meet_node(row, Span(lanes, 0, lanes))
     for dof in range(6):
         for j in range(lanes):
             coefficients = quintic(
-                row[(at.KNOT_BEFORE + dof) * lanes + j],
-                row[(at.KNOT_BEFORE + 6 + dof) * lanes + j],
-                row[(at.KNOT_BEFORE + 12 + dof) * lanes + j],
-                row[(at.KNOT + dof) * lanes + j],
-                row[(at.KNOT + 6 + dof) * lanes + j],
-                row[(at.KNOT + 12 + dof) * lanes + j],
+                row[(at.NODE_BEFORE + dof) * lanes + j],
+                row[(at.NODE_BEFORE + 6 + dof) * lanes + j],
+                row[(at.NODE_BEFORE + 12 + dof) * lanes + j],
+                row[(at.NODE + dof) * lanes + j],
+                row[(at.NODE + 6 + dof) * lanes + j],
+                row[(at.NODE + 12 + dof) * lanes + j],
                 row[at.CONTROL_PERIOD * lanes + j],
             )
             for k in range(6):
@@ -112,7 +112,7 @@ def deck_at(row: Block, frame: Block, index: int, lanes: int) -> None:
 def deck_now(row: Block, frame: Block, lanes: int) -> None:
     """Pose from the deck's coordinates as they are in the row."""
     for j in range(lanes):
-        m = at.KNOT
+        m = at.NODE
         write_pose(
             row,
             frame,

@@ -1,27 +1,23 @@
 """What a frame's present state means: deflection of S, reactions, servomotor forces, utilisation, largest rotation.
 
 Reactions are R = Pᵀ(K q + L q̇ - f), linear in the modes and in what acts on the frame, see
-``aframe_env.dynamics.rfem.constraints``.
+``aframe_env.rfem.constraints``; the tables that say how come from ``aframe_env.rfem.tables``.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache, lru_cache
+from functools import cache
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 from numba import prange
 
-from aframe_env.crane import Frame
 from aframe_env.dynamics.blocks import nine
 from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar
 from aframe_env.dynamics.flexible import layout as flex
-from aframe_env.dynamics.flexible.reduction import ModalFrame, modal_frame
-from aframe_env.dynamics.rfem.chain import Division
-from aframe_env.dynamics.rfem.model import SMALL_ROTATION, FrameModel
 
 Array = npt.NDArray[np.float64]
 
@@ -38,74 +34,13 @@ ROTATION: Final = 12
 """Largest rotation of an rfe, rad; 0 where a bound on it is within SMALL_ROTATION."""
 READOUTS: Final = 13
 
+SMALL_ROTATION: Final = 0.05
+"""Rotation of an rfe up to which eq. (10) is taken to hold, rad."""
+
 # Head of a line of the readout's table.
 COUNT, CARRIED_COUNT, SPRINGS, POINTS, DAMPED, BODIES, HEAD = 0, 1, 2, 3, 4, 5, 6
 FORCES: Final = 11
 """Numbers that are linear in the state: columns up to UTILISATION."""
-
-
-def _forces(model: FrameModel, residual: Array, position: Array, velocity: Array) -> Array:
-    """Feet and servomotors, (k, 8), of K q + L q̇ - f, q and q̇, each (k, n)."""
-    reactions = model.reactions(residual)
-    feet = model.foot_reactions(reactions).reshape(-1, 6)
-    return np.hstack([feet, model.servomotor_tensions(position, velocity, reactions)])
-
-
-def _acting(model: FrameModel, forces: Array) -> Array:
-    """Columns of FORCES for generalised forces (n, k) on the frame, (k, FORCES)."""
-    none = np.zeros(forces.T.shape)
-    return np.hstack([np.zeros((forces.shape[1], 3)), _forces(model, -forces.T, none, none)])
-
-
-def _points(modal: ModalFrame) -> Array:
-    """Share of the yield strength by unit N, M2, M3 (normal) and V2, V3, T (shear), (n_sde, points, 6)."""
-    springs = modal.model.structure.springs
-    sections = [spring.member.section_at(spring.position) for spring in springs]
-    result = np.zeros((len(springs), max(len(section.stress_points) for section in sections) or 1, 6))
-    for index, (spring, section) in enumerate(zip(springs, sections, strict=True)):
-        if not section.stress_points:
-            result[index] = np.nan
-        for number, point in enumerate(section.stress_points):
-            result[index, number] = (
-                1.0 / section.area,
-                point.offset_3 / section.second_moment_2,
-                point.offset_2 / section.second_moment_3,
-                point.shear_2,
-                point.shear_3,
-                point.torsion,
-            )
-        result[index] /= spring.member.material.yield_strength
-    return result
-
-
-@lru_cache(maxsize=8)
-def readout_table(frame: Frame, division: Division, modes: int | None) -> Array:
-    """Line of the readout's table for a frame, (size,)."""
-    modal = modal_frame(frame, division, modes)
-    model, shape = modal.model, modal.shape
-    none = np.zeros(shape.T.shape)
-    size = shape.shape[0]
-    by_position = np.hstack([(modal.pulley @ shape).T, _forces(model, shape.T @ model.stiffness, shape.T, none)])
-    by_rate = np.hstack([np.zeros((modal.count, 3)), _forces(model, shape.T @ model.damping, none, shape.T)])
-    strain = (model.deformation @ shape).T
-    points = _points(modal)
-    damping = model.structure.damping()
-    turned = shape.T.reshape(modal.count, -1, 6)[:, :, 3:]
-    reach = np.linalg.norm(turned, axis=2).max(axis=1)
-    head = [modal.count, modal.carried_count, *points.shape[:2], bool(damping.any()), turned.shape[1]]
-    parts = [
-        by_position,
-        by_rate,
-        _acting(model, np.hstack([modal.uniform, -modal.turning.reshape(size, 9)])),
-        _acting(model, -modal.carried.reshape(size, -1)),
-        _acting(model, modal.pulley.T),
-        strain * model.structure.stiffness(),
-        strain * damping,
-        points,
-        reach,
-        turned,
-    ]
-    return np.concatenate([np.array(head, dtype=np.float64), *(part.ravel() for part in parts)])
 
 
 @scalar

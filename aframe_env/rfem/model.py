@@ -1,0 +1,257 @@
+"""The full model's constant matrices: everything that statics, modes and dynamics need of the frame.
+
+M_F is diagonal and constant, K_F and L_F are constant, eqs. (14)–(22). A frame on a deck that turns or a
+frame that luffs adds inertial terms e_F, which are linear in the deck's acceleration and in q, q̇
+(:class:`CarriedInertia`).
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, TypeAlias
+
+import numpy as np
+import scipy
+
+from aframe_env.dynamics.flexible.readout import SMALL_ROTATION
+from aframe_env.rfem.beam import Array
+from aframe_env.rfem.constraints import Constraints, constrain, luffing_rotation, servomotor_rows
+from aframe_env.rfem.structure import Division, Structure, one_chain
+from aframe_env.rfem.three_beams import three_beams
+from aframe_env.scenario.crane import GRAVITY, Frame
+from aframe_env.validation import SmallRotationWarning, require_choice
+
+Layout: TypeAlias = Literal["one_chain", "three_beams"]
+"""One chain with shared corner rfes (the paper's model), or three beams joined by 12 more reactions (its
+previous)."""
+
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+def warn_of_rotation(largest: float, stacklevel: int = 2) -> bool:
+    """Warn with the figure when an rfe's rotation ``largest``, rad, is above SMALL_ROTATION; return whether it is."""
+    if largest > SMALL_ROTATION:
+        warnings.warn(
+            f"an rfe turned by {largest:.3g} rad: rotations are small by assumption (10), up to {SMALL_ROTATION} rad",
+            SmallRotationWarning,
+            stacklevel=stacklevel + 1,
+        )
+    return largest > SMALL_ROTATION
+
+
+@dataclass(frozen=True)
+class FrameModel:
+    """The frame as rfes and sdes with its constraints eliminated: q = Z z + P b.
+
+    Build it with :func:`frame_model`.
+    """
+
+    frame: Frame
+    division: Division
+    structure: Structure
+    constraints: Constraints
+
+    @cached_property
+    def mass(self) -> Array:
+        """Diagonal of M_F, (n,)."""
+        return self.structure.mass()
+
+    @cached_property
+    def deformation(self) -> scipy.sparse.csr_array:
+        """(6 n_sde, n): deformations of the sdes."""
+        return self.structure.deformation()
+
+    @cached_property
+    def stiffness(self) -> Array:
+        """K_F with that of elastic servomotors, (n, n), N/m and N m/rad."""
+        servomotor = self.frame.structure.servomotor.stiffness or 0.0
+        return self._assembled(self.structure.stiffness(), servomotor)
+
+    @cached_property
+    def damping(self) -> Array:
+        """L_F with that of elastic servomotors, (n, n), N s/m and N m s/rad."""
+        return self._assembled(self.structure.damping(), self.frame.structure.servomotor.damping)
+
+    def _assembled(self, diagonal: Array, servomotor: float) -> Array:
+        spread = self.deformation
+        total = (spread.T @ scipy.sparse.diags_array(diagonal) @ spread).toarray()
+        rows = self.servomotors
+        return np.asarray(total + servomotor * rows.T @ rows, dtype=np.float64)
+
+    @cached_property
+    def servomotors(self) -> Array:
+        """(2, n): shortening of S_R and S_L."""
+        return servomotor_rows(self.frame, self.structure)
+
+    @cached_property
+    def lengthening(self) -> Array:
+        """(n, 2): share P b of q for S_R or S_L longer by 1 m; zero where they are elastic.
+
+        It moves only the rfes that constraints touch, so never that of S.
+        """
+        if self.frame.structure.servomotor.stiffness is not None:
+            return np.zeros((self.structure.size, 2))
+        return -self.constraints.particular[:, :2]
+
+    @cached_property
+    def pulley(self) -> Array:
+        """(3, n): displacement of S in {F}; its transpose takes a force at S to generalised forces."""
+        return self.structure.translation("S")
+
+    @cached_property
+    def to_deck(self) -> Array:
+        """{F} → {D}, (3, 3)."""
+        return luffing_rotation(self.frame.luffing_angle)
+
+    @cached_property
+    def reduced_stiffness(self) -> Array:
+        """ZᵀKZ, (n_z, n_z), 1/s² (Z is M-orthonormal)."""
+        return self._reduced(self.stiffness)
+
+    @cached_property
+    def reduced_damping(self) -> Array:
+        """ZᵀLZ, (n_z, n_z), 1/s."""
+        return self._reduced(self.damping)
+
+    def _reduced(self, matrix: Array) -> Array:
+        basis = scipy.sparse.csr_array(self.constraints.basis)
+        reduced = (basis.T @ scipy.sparse.csr_array(matrix) @ basis).toarray()
+        return np.asarray(0.5 * (reduced + reduced.T), dtype=np.float64)
+
+    @property
+    def unknowns(self) -> dict[str, int]:
+        """Counts: coordinates of the frame, with load and drum (the paper's n_q), reactions, free
+        coordinates."""
+        size, reactions = self.structure.size, len(self.constraints.names)
+        return {
+            "frame coordinates": size,
+            "n_q": size + 4,
+            "n_R": reactions,
+            "free coordinates": size - reactions,
+        }
+
+    def weight(self, gravity: float = GRAVITY) -> Array:
+        """Generalised forces of the frame's own weight with the deck level, eq. (22), (n,)."""
+        down = self.to_deck.T @ DOWN
+        return np.asarray(gravity * self.uniform_field() @ down, dtype=np.float64)
+
+    def uniform_field(self) -> Array:
+        """(n, 3): generalised forces per unit of a uniform acceleration field along the axes of {F}."""
+        field = np.zeros((self.structure.size, 3))
+        for index, body in enumerate(self.structure.bodies):
+            field[6 * index : 6 * index + 3] = body.mass * body.axes.T
+        return np.asarray(field - self.deformation.T @ self._bulge.reshape(-1, 3), dtype=np.float64)
+
+    @cached_property
+    def _bulge(self) -> Array:
+        return np.array([spring.bulge for spring in self.structure.springs])
+
+    def reactions(self, residual: Array, lengthening: Array | None = None) -> Array:
+        """R, (…, r), of ``residual`` K q + L q̇ − f, (…, n), and s̈ of rigid servomotors, (…, 2), m/s²: Pᵀ(K q +
+        L q̇ − f) + (CM⁻¹Cᵀ)⁻¹ b̈."""
+        result = residual @ self.constraints.particular
+        return np.asarray(result if lengthening is None else result - lengthening @ self.constraints.weight[:2])
+
+    def servomotor_tensions(self, position: Array, velocity: Array, reactions: Array) -> Array:
+        """Tension of S_R and S_L, (…, 2), N, from the reactions (rigid) or the springs (elastic)."""
+        servomotor = self.frame.structure.servomotor
+        if servomotor.stiffness is None:
+            return reactions[..., :2]
+        springs = servomotor.stiffness * position + servomotor.damping * velocity
+        return np.asarray(-springs @ self.servomotors.T)
+
+    def foot_reactions(self, reactions: Array) -> Array:
+        """Forces on the frame at A_R and A_L along {D}, (…, 2, 3), N."""
+        first = self.constraints.names.index("R_AR1")
+        feet = reactions[..., first : first + 6].reshape(*reactions.shape[:-1], 2, 3)
+        return np.asarray(feet @ self.to_deck.T)
+
+    def spring_forces(self, position: Array, velocity: Array | None = None, field: Array | None = None) -> Array:
+        """Section forces N, V2, V3, T, M2, M3 at the sdes, (…, n_sde, 6), N and N m (N tension positive).
+
+        Args:
+            position: q, (…, n).
+            velocity: q̇, (…, n); needed where there is damping.
+            field: Uniform acceleration field along {F} (gravity less the deck's acceleration), (…, 3), m/s²;
+                needed with corrected shear.
+        """
+        forces = (self.deformation @ position.T).T * self.structure.stiffness()
+        if velocity is not None:
+            forces = forces + (self.deformation @ velocity.T).T * self.structure.damping()
+        result = np.asarray(forces).reshape(*position.shape[:-1], -1, 6)
+        return result if field is None else result + np.einsum("sij,...j->...si", self._bulge, field)
+
+    def warn_of_rotation(self, position: Array) -> float:
+        """Largest rotation of an rfe, rad; warn with the figure when it passes 0.05 rad."""
+        angles = position.reshape(-1, 6)[:, 3:]
+        largest = float(np.sqrt(np.max(np.sum(angles**2, axis=1))))
+        warn_of_rotation(largest, stacklevel=3)
+        return largest
+
+
+class CarriedInertia:
+    """Inertial terms e_F of a frame carried by a deck that turns, and by its own luffing.
+
+    A point of {F} at ρ has the acceleration w + W ρ, w = RᵀP̈ and W = RᵀR̈ (R: {F} → inertial, P: origin),
+    and its displacement u adds W u + 2 Ω× u̇. Integrated over the rfes: e_F = E_0 w + E_1 W + E(W) q + E(2
+    Ω×) q̇.
+    """
+
+    def __init__(self, model: FrameModel) -> None:
+        bodies = model.structure.bodies
+        self._uniform = model.uniform_field()
+        self._constant = np.zeros((model.structure.size, 3, 3))
+        self._blocks = np.zeros((len(bodies), 6, 6, 3, 3))
+        permutation = np.zeros((3, 3, 3))
+        for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            permutation[a, b, c], permutation[a, c, b] = 1.0, -1.0
+        for index, body in enumerate(bodies):
+            axes = body.axes
+            # ∫ s sᵀ dm along the principal axes, from the moments of inertia.
+            second = np.diag(0.5 * np.sum(body.inertia) - body.inertia)
+            local = np.zeros((6, 3, 3))
+            local[:3] = body.mass * np.einsum("ac,d->acd", np.eye(3), axes.T @ body.centre)
+            local[3:] = np.einsum("abc,bd->acd", permutation, second)
+            block = np.zeros((6, 6, 3, 3))
+            block[:3, :3] = body.mass * np.einsum("ac,bd->abcd", np.eye(3), np.eye(3))
+            block[3:, 3:] = np.einsum("abc,def,bf->aecd", permutation, permutation, second)
+            # From W along the principal axes, AᵀWA, to W along {F}.
+            self._constant[6 * index : 6 * index + 6] = np.einsum("acd,ec,fd->aef", local, axes, axes)
+            self._blocks[index] = np.einsum("abcd,ec,fd->abef", block, axes, axes)
+
+    def constant(self, acceleration: Array, turning: Array) -> Array:
+        """e_F of the undeformed frame, (n,): ``acceleration`` w (3,), m/s², ``turning`` W (3, 3), 1/s²."""
+        return np.asarray(self._uniform @ acceleration + np.einsum("aef,ef->a", self._constant, turning))
+
+    def blocks(self, turning: Array) -> Array:
+        """E(W), one 6 × 6 block a body: (rfes, 6, 6)."""
+        return np.tensordot(self._blocks, turning, axes=2)
+
+
+def apply_blocks(blocks: Array, displacement: Array) -> Array:
+    """Block diagonal matrix (rfes, 6, 6) times q or q̇, (n,)."""
+    return np.asarray((blocks @ displacement.reshape(-1, 6, 1)).ravel())
+
+
+def frame_model(
+    frame: Frame,
+    division: Division | None = None,
+    *,
+    layout: Layout = "one_chain",
+    corrected_shear: bool = False,
+) -> FrameModel:
+    """Build the full model of ``frame``.
+
+    Args:
+        frame: Geometry, material, sections, servomotors.
+        division: Primary elements of legs and beam; default 10 and 8.
+        layout: ``"one_chain"`` (the paper's model) or ``"three_beams"`` (its previous one). Same results.
+        corrected_shear: See :func:`aframe_env.rfem.beam.divide`.
+    """
+    require_choice("layout", layout, ("one_chain", "three_beams"))
+    cut = division or Division()
+    build = one_chain if layout == "one_chain" else three_beams
+    structure = build(frame, cut, corrected_shear=corrected_shear)
+    return FrameModel(frame, cut, structure, constrain(frame, structure))

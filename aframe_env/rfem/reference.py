@@ -1,0 +1,31 @@
+"""Figures of independent programs for the reference crane, shipped with the package."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+from typing import Any, Literal
+
+import numpy as np
+
+from aframe_env.rfem.beam import Array
+
+_DATA = files("aframe_env") / "data" / "reference"
+
+
+def static_cases() -> dict[str, dict[str, Any]]:
+    """Static load cases G, V and L1 of a beam finite-element program (elements of 0.1 m); N, m, rad, {D}."""
+    cases: dict[str, dict[str, Any]] = json.loads((_DATA / "static.json").read_text())["cases"]
+    return cases
+
+
+def natural_frequencies() -> Array:
+    """First ten natural frequencies of the frame, Hz, of that program (elements of 0.05 m); (10,)."""
+    return np.array(json.loads((_DATA / "modal.json").read_text())["A_lumped_rotary"])
+
+
+def time_series(name: Literal["release_ramp", "paper_rigid", "paper_flexible"]) -> dict[str, Array]:
+    """Columns of a dynamic reference run, by their names; each (k,)."""
+    lines = (_DATA / f"dynamic_{name}.csv").read_text().splitlines()
+    values = np.array([[float(item) for item in line.split(",")] for line in lines[1:]])
+    return {column: values[:, index] for index, column in enumerate(lines[0].split(","))}

@@ -1,0 +1,33 @@
+"""What fixes an episode: crane, ship motion, sea, vessel, sensors, load; fixed, drawn, or read from a file."""
+
+from aframe_env.scenario.crane import GRAVITY, Crane, Frame, Rope, Winch
+from aframe_env.scenario.distribution import NUMBERS, Range, ScenarioDistribution, ScenarioSource
+from aframe_env.scenario.motion import Harmonic, HarmonicMotion, ShipMotion
+from aframe_env.scenario.recorded_motion import RecordedMotion
+from aframe_env.scenario.scenario import Initial, Scenario
+from aframe_env.scenario.sea import Sea, SeaMotion
+from aframe_env.scenario.sensors import Channel, Sensors
+from aframe_env.scenario.vessel import Vessel
+
+__all__ = [
+    "GRAVITY",
+    "NUMBERS",
+    "Channel",
+    "Crane",
+    "Frame",
+    "Harmonic",
+    "HarmonicMotion",
+    "Initial",
+    "Range",
+    "RecordedMotion",
+    "Rope",
+    "Scenario",
+    "ScenarioDistribution",
+    "ScenarioSource",
+    "Sea",
+    "SeaMotion",
+    "Sensors",
+    "ShipMotion",
+    "Vessel",
+    "Winch",
+]

@@ -1,0 +1,135 @@
+"""The crane and its parts. Numbers in SI units; the defaults are the reference crane.
+
+Axes (right-handed): the deck frame {D} has its origin midway between the feet, x outboard (aft, for a frame
+at the stern), z up, and y to the left of somebody who looks outboard. The frame axes {F} share the origin
+and are turned about y by the luffing angle.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from aframe_env.dynamics.start import free_length
+from aframe_env.scenario.cross_sections import FrameStructure
+from aframe_env.validation import InvalidValue, require_number, require_vector
+
+Vector = tuple[float, float, float]
+
+GRAVITY = 9.81
+"""Acceleration of gravity, m/s² (the reference crane's figure)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Frame:
+    """Geometry of the A-frame: a portal of two legs and a top beam, luffed by two servomotors."""
+
+    half_width: float = 5.0
+    """Half the distance between the feet A_R and A_L, m."""
+    height: float = 12.0
+    """Height of the corners B_R, B_L and of the pulley S along z of {F}, m."""
+    luffing_angle: float = math.radians(25.0)
+    """Luffing angle φ, rad; positive leans outboard."""
+    servomotor_height: float = 4.8
+    """Height of the servomotor ends N_R, N_L on the legs, along z of {F}, m."""
+    servomotor_deck_x: float = -5.0
+    """x coordinate in {D} of the servomotor ends C_R, C_L on the deck, m."""
+    structure: FrameStructure = field(default_factory=FrameStructure)
+    """Material, sections and servomotors (the full model alone reads them)."""
+
+    def __post_init__(self) -> None:
+        require_number("half_width", self.half_width, "m", low=0.0, low_open=True)
+        require_number("height", self.height, "m", low=0.0, low_open=True)
+        require_number("luffing_angle", self.luffing_angle, "rad", low=-1.4, high=1.4)
+        require_number("servomotor_height", self.servomotor_height, "m", low=0.0, high=self.height, low_open=True)
+        require_number("servomotor_deck_x", self.servomotor_deck_x, "m")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rope:
+    """Elastic hoisting rope, which can pull and cannot push."""
+
+    axial_stiffness: float = 2.0e8
+    """E_R F_R, N. The default is about a 70 mm six-strand steel rope."""
+    breaking_load: float = 3.42e6
+    """Tension at which the rope parts, N. Default: 0.356 d² R with d = 70 mm, R = 1960 N/mm² (EN 12385-4)."""
+
+    def __post_init__(self) -> None:
+        require_number("axial_stiffness", self.axial_stiffness, "N", low=0.0, low_open=True)
+        require_number("breaking_load", self.breaking_load, "N", low=0.0, low_open=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Winch:
+    """The drum and its drive: an actuator with limits on speed, acceleration and paid-out length."""
+
+    drum_diameter: float = 1.5
+    """d_H, m."""
+    max_rope_speed: float = 3.0
+    """Speed limit, m/s of rope."""
+    max_rope_acceleration: float = 2.0
+    """Acceleration limit, m/s² of rope."""
+    lag: float = 0.0
+    """Time constant of the first-order response of speed to its command, s; 0 for none."""
+    min_rope_length: float = 20.0
+    """Upper hoist limit switch: least unstretched length paid out between drum and load, m."""
+    max_rope_length: float = 3000.0
+    """Rope on the drum: greatest unstretched length between drum and load, m."""
+
+    def __post_init__(self) -> None:
+        require_number("drum_diameter", self.drum_diameter, "m", low=0.0, low_open=True)
+        require_number("max_rope_speed", self.max_rope_speed, "m/s", low=0.0, low_open=True)
+        require_number("max_rope_acceleration", self.max_rope_acceleration, "m/s²", low=0.0, low_open=True)
+        require_number("lag", self.lag, "s", low=0.0)
+        require_number("min_rope_length", self.min_rope_length, "m", low=0.0, low_open=True)
+        require_number("max_rope_length", self.max_rope_length, "m", low=self.min_rope_length, low_open=True)
+
+    @property
+    def drum_radius(self) -> float:
+        """d_H / 2, m."""
+        return 0.5 * self.drum_diameter
+
+    @property
+    def max_speed(self) -> float:
+        """Speed limit of the drum, rad/s."""
+        return self.max_rope_speed / self.drum_radius
+
+    @property
+    def max_acceleration(self) -> float:
+        """Acceleration limit of the drum, rad/s²."""
+        return self.max_rope_acceleration / self.drum_radius
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crane:
+    """A-frame crane: frame, rope, winch and the drum's place on the deck."""
+
+    frame: Frame = field(default_factory=Frame)
+    rope: Rope = field(default_factory=Rope)
+    winch: Winch = field(default_factory=Winch)
+    drum_position: Vector = (-2.0, 0.0, 1.0)
+    """Drum H in {D}, m."""
+
+    def __post_init__(self) -> None:
+        require_vector("drum_position", self.drum_position, "m")
+        if self.drum_to_pulley == 0.0:
+            raise InvalidValue(f"drum_position = {self.drum_position} m: must not be the pulley's place")
+
+    @cached_property
+    def pulley_position(self) -> Vector:
+        """Pulley S, the middle of the top beam, in {D} with the frame rigid, m."""
+        angle, height = self.frame.luffing_angle, self.frame.height
+        return (height * math.sin(angle), 0.0, height * math.cos(angle))
+
+    @cached_property
+    def drum_to_pulley(self) -> float:
+        """|SH| with the frame rigid, m."""
+        return math.dist(self.pulley_position, self.drum_position)
+
+    def free_length(self, rope_length: float, weight: float) -> float:
+        """Unstretched rope [m] between drum and a load of ``weight`` N that hangs ``rope_length`` m below the pulley.
+
+        The ship is at rest and the frame rigid.
+        """
+        return free_length(rope_length, self.drum_to_pulley, weight, self.rope.axial_stiffness)

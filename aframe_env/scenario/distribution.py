@@ -1,0 +1,148 @@
+"""The distribution that scenarios are drawn from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from aframe_env.dynamics.start import critical_damping
+from aframe_env.scenario.crane import GRAVITY, Crane
+from aframe_env.scenario.scenario import Scenario
+from aframe_env.scenario.sea import FULL_TURN, Sea, SeaMotion, dnv_gamma
+from aframe_env.scenario.vessel import Vessel
+from aframe_env.validation import InvalidValue, require_integer, require_number
+
+Range = float | tuple[float, float]
+"""One exact value, or the interval that a value is drawn from uniformly."""
+
+SUBSTREAM: Final = 8
+"""Numbers that sea, load and rope each take from the generator, however many they need."""
+NUMBERS: Final = 3 * SUBSTREAM
+"""Random numbers that a scenario is drawn with."""
+
+
+def _require_range(name: str, value: Any, unit: str, low: float, high: float, low_open: bool = False) -> None:
+    if isinstance(value, tuple):
+        if len(value) != 2:
+            raise InvalidValue(f"{name} = {value!r}: must be a number or a tuple (low, high) in {unit}")
+        for part, item in zip(("low", "high"), value, strict=True):
+            require_number(f"{name} ({part})", item, unit, low=low, high=high, low_open=low_open)
+        if value[0] > value[1]:
+            raise InvalidValue(f"{name} = {value!r} {unit}: the low end is above the high end")
+    elif isinstance(value, list):
+        raise InvalidValue(f"{name} = {value!r}: must be a number or a tuple (low, high) in {unit}")
+    else:
+        require_number(name, value, unit, low=low, high=high, low_open=low_open)
+
+
+def _draw(value: Range, uniform: float) -> float:
+    return value[0] + (value[1] - value[0]) * uniform if isinstance(value, tuple) else value
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScenarioDistribution:
+    """What scenarios are drawn from: seas, load masses and rope lengths, each exact or an interval.
+
+    Sea, load and rope take their random numbers from sub-streams of their own: changing one leaves the others'
+    draws alone.
+    """
+
+    hs: Range = (0.5, 4.0)
+    """Significant wave height, m."""
+    tp: Range = (6.0, 14.0)
+    """Peak period, s."""
+    heading: Range = (0.0, 2.0 * math.pi)
+    """Direction that the waves travel towards, rad from the bow."""
+    gamma: Range | Literal["dnv"] = "dnv"
+    """Peak enhancement factor; "dnv" takes the one that goes with Hs and Tp."""
+    spectrum: str = "jonswap"
+    spreading: int | None = None
+    components: int = 32
+    vessel: Vessel = field(default_factory=Vessel.supply)
+    load_mass: Range = (20.0e3, 100.0e3)
+    """kg."""
+    rope_length: Range = (50.0, 1500.0)
+    """|LS| with the ship at rest, m."""
+    rope_damping_ratio: Range = (0.01, 0.05)
+    """Damping of the load's bobbing on the rope, share of critical."""
+    ramp: float = 10.0
+    """Time over which the ship's motion builds up, s."""
+    crane: Crane = field(default_factory=Crane)
+
+    def __post_init__(self) -> None:
+        _require_range("hs", self.hs, "m", 0.0, 30.0)
+        _require_range("tp", self.tp, "s", 2.0, 40.0)
+        _require_range("heading", self.heading, "rad", -FULL_TURN, FULL_TURN)
+        if self.gamma != "dnv":
+            if isinstance(self.gamma, str):
+                raise InvalidValue(f"gamma = {self.gamma!r}: must be 'dnv', a number or a tuple (low, high) in [1, 10]")
+            _require_range("gamma", self.gamma, "", 1.0, 10.0)
+        require_number("ramp", self.ramp, "s", low=0.0, high=1e4)
+        _require_range("load_mass", self.load_mass, "kg", 0.0, 1e7, low_open=True)
+        _require_range("rope_length", self.rope_length, "m", 0.0, 1e5, low_open=True)
+        _require_range("rope_damping_ratio", self.rope_damping_ratio, "of critical", 0.0, 1.0)
+        require_integer("components", self.components, low=1, high=4096)
+        self._require_rope()
+        # The corners of the distribution must be scenarios: refuse now rather than in the middle of a run.
+        for u in (0.0, 1.0):
+            self._build(np.full(SUBSTREAM, u), np.full(SUBSTREAM, u), np.full(SUBSTREAM, u))
+
+    def _require_rope(self) -> None:
+        """Raise where a rope is longer or shorter than the winch allows, in the user's words."""
+        least, most = self.crane.winch.min_rope_length, self.crane.winch.max_rope_length
+        for length in self.rope_length if isinstance(self.rope_length, tuple) else (self.rope_length,):
+            for mass in self.load_mass if isinstance(self.load_mass, tuple) else (self.load_mass,):
+                paid_out = self.crane.free_length(length, mass * GRAVITY)
+                if not least < paid_out < most:
+                    raise InvalidValue(
+                        f"rope_length = {self.rope_length!r} m: {length:g} m needs {paid_out:g} m of unstretched rope "
+                        f"between drum and load: must be in ({least:g}, {most:g}) m, the winch's limits"
+                    )
+
+    def draw(self, rng: np.random.Generator) -> Scenario:
+        """Draw one scenario."""
+        return self.at(rng.random(NUMBERS))
+
+    def at(self, uniforms: np.ndarray) -> Scenario:
+        """Return the scenario that these numbers (NUMBERS,) in [0, 1) stand for: sea, load and rope."""
+        return self._build(uniforms[:SUBSTREAM], uniforms[SUBSTREAM : 2 * SUBSTREAM], uniforms[2 * SUBSTREAM :])
+
+    def nominal(self) -> Scenario:
+        """Return the scenario in the middle of every interval, with the first realisation of its sea."""
+        half = np.full(SUBSTREAM, 0.5)
+        sea = half.copy()
+        sea[4] = 0.0
+        return self._build(sea, half, half)
+
+    def _build(self, u_sea: np.ndarray, u_load: np.ndarray, u_rope: np.ndarray) -> Scenario:
+        s, m, r = u_sea.tolist(), u_load.tolist(), u_rope.tolist()
+        hs, tp = _draw(self.hs, s[0]), _draw(self.tp, s[1])
+        gamma = dnv_gamma(hs, tp) if self.gamma == "dnv" else _draw(self.gamma, s[3])
+        sea = Sea(
+            hs=hs,
+            tp=tp,
+            heading=_draw(self.heading, s[2]),
+            spectrum=self.spectrum,
+            gamma=gamma,
+            spreading=self.spreading,
+            components=self.components,
+            seed=int(s[4] * 2**53),
+        )
+        load_mass, rope_length = _draw(self.load_mass, m[0]), _draw(self.rope_length, r[0])
+        weight = load_mass * GRAVITY
+        stiffness = self.crane.rope.axial_stiffness / self.crane.free_length(rope_length, weight)
+        return Scenario(
+            crane=self.crane,
+            motion=SeaMotion(sea=sea, vessel=self.vessel),
+            load_mass=load_mass,
+            target_level=self.crane.pulley_position[2] - rope_length,
+            rope_damping=_draw(self.rope_damping_ratio, r[1]) * critical_damping(stiffness, load_mass),
+            ramp=self.ramp,
+        )
+
+
+ScenarioSource = Scenario | ScenarioDistribution
+"""What an environment takes: one fixed scenario, or the distribution to draw from."""

@@ -1,0 +1,194 @@
+"""A recorded ship motion: read from CSV, checked, and resampled for the engine.
+
+The file: ``#`` starts a comment line; the first other line is the header, which names seven columns with
+their units, in any order, as in ``time_s,surge_m,sway_m,heave_m,roll_deg,pitch_deg,yaw_deg``; then one line
+of numbers for each sample. Units: time in s or ms; surge, sway and heave in m, cm, mm or ft; roll, pitch and
+yaw in rad or deg. Axes and angles are those of ``motion``: x outboard, z up, ZYX Euler angles of the deck
+frame.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import numpy.typing as npt
+import scipy
+
+from aframe_env.scenario.motion import COORDINATES, FloatArray
+from aframe_env.validation import InvalidValue, require_number
+
+if TYPE_CHECKING:
+    pass
+
+_LENGTHS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
+_ANGLES: Final = {"rad": 1.0, "deg": math.pi / 180.0}
+_UNITS: Final = {
+    "time": {"s": 1.0, "ms": 0.001},
+    **dict.fromkeys(COORDINATES[:3], _LENGTHS),
+    **dict.fromkeys(COORDINATES[3:], _ANGLES),
+}
+_EXAMPLE: Final = "time_s,surge_m,sway_m,heave_m,roll_deg,pitch_deg,yaw_deg"
+
+MIN_SAMPLES: Final = 12
+"""Fewest samples of a record: twice what one quintic piece of the spline rests on."""
+GAP: Final = 1.5
+"""A time step longer than this many medians is a gap."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedMotion:
+    """Motion of the deck frame that somebody measured or computed elsewhere, on its own times.
+
+    Between the samples it is the quintic spline through them, so that position, velocity and acceleration are
+    all smooth. For a component of amplitude A and frequency ω, sampled every T, the spline errs by up to
+    about A (ωT)⁶/14000 away from the record's ends: 2e-5 A with 8 samples a period, 2e-7 A with 17. A record
+    that is finer than the environment's steps is not filtered: the spline goes through every sample, and
+    noise in the record becomes motion of the ship. Smooth such a record first.
+
+    Raises ``InvalidValue`` for a record with a gap, a NaN, times that do not increase, or fewer than
+    ``MIN_SAMPLES`` samples.
+    """
+
+    times: FloatArray = field(repr=False)
+    """(T,) s, increasing, in nearly equal steps; the first is where an episode starts."""
+    coordinates: FloatArray = field(repr=False)
+    """(T, 6): surge, sway, heave, m; roll, pitch, yaw, rad. Jumps of roll and yaw by 2π are taken out."""
+    path: Path | None = None
+    """The file that it was read from, if it was."""
+
+    def __post_init__(self) -> None:
+        source = "record" if self.path is None else str(self.path)
+        times = np.array(self.times, dtype=np.float64)
+        coordinates = np.array(self.coordinates, dtype=np.float64)
+        if times.ndim != 1 or coordinates.shape != (len(times), 6):
+            raise InvalidValue(
+                f"{source}: times of shape {times.shape} and coordinates of shape {coordinates.shape}: "
+                "must be (T,) and (T, 6)"
+            )
+        _check(times, coordinates, [f"{source}, sample {i}" for i in range(len(times))], source)
+        times -= times[0]
+        for angle in (3, 5):
+            coordinates[:, angle] = np.unwrap(coordinates[:, angle])
+        times.setflags(write=False)
+        coordinates.setflags(write=False)
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "coordinates", coordinates)
+        object.__setattr__(self, "_spline", scipy.interpolate.make_interp_spline(times, coordinates, k=5))
+
+    @classmethod
+    def from_csv(cls, path: str | Path) -> RecordedMotion:
+        """Read a record from a CSV file (see the module's docstring). Errors name file and line."""
+        times, coordinates, lines = _read(Path(path))
+        _check(times, coordinates, [f"{path}, line {line}" for line in lines], str(path))
+        return cls(times=times, coordinates=coordinates, path=Path(path))
+
+    @property
+    def duration(self) -> float:
+        """Time from the first sample to the last, s."""
+        return float(self.times[-1])
+
+    def at(self, times: npt.ArrayLike) -> FloatArray:
+        """Coordinates, rates and accelerations at ``times`` (T,) s from the first sample: array (3, T, 6).
+
+        Times are in [0, ``duration``].
+        """
+        t = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        for extreme in (t.min(), t.max()) if t.size else ():
+            require_number("time", float(extreme), "s", low=0.0, high=self.duration)
+        spline: scipy.interpolate.BSpline = self._spline  # type: ignore[attr-defined]
+        return np.stack([spline(t), spline(t, nu=1), spline(t, nu=2)])
+
+    def table(self, period: float) -> FloatArray:
+        """Coordinates, rates and accelerations at 0, ``period``, ... up to ``duration``: (T, 18)."""
+        require_number("period", period, "s", low=0.0, high=1e6, low_open=True)
+        # A duration that is a whole number of periods up to rounding has its last line too.
+        count = math.floor(self.duration / period + 1e-6) + 1
+        times = np.minimum(np.arange(count) * period, self.duration)
+        return np.concatenate(list(self.at(times)), axis=1)
+
+
+def _check(times: FloatArray, coordinates: FloatArray, places: list[str], source: str) -> None:
+    """Raise at the first sample that cannot be part of a motion. ``places`` names each sample."""
+    for index, place in enumerate(places):
+        if not math.isfinite(times[index]):
+            raise InvalidValue(f"{place}: time = {times[index]} s: must be finite")
+        bad = np.flatnonzero(~np.isfinite(coordinates[index]))
+        if len(bad):
+            name = COORDINATES[bad[0]]
+            unit = "m" if bad[0] < 3 else "rad"
+            raise InvalidValue(f"{place}: {name} = {coordinates[index, bad[0]]} {unit}: must be finite")
+    if len(times) < MIN_SAMPLES:
+        raise InvalidValue(f"{places[-1] if places else source}: {len(times)} samples: must be at least {MIN_SAMPLES}")
+    steps = np.diff(times)
+    backwards = np.flatnonzero(steps <= 0.0)
+    if len(backwards):
+        i = int(backwards[0])
+        raise InvalidValue(
+            f"{places[i + 1]}: time = {times[i + 1]:g} s after {times[i]:g} s: must increase line by line"
+        )
+    median = float(np.median(steps))
+    gaps = np.flatnonzero(steps > GAP * median)
+    if len(gaps):
+        i = int(gaps[0])
+        raise InvalidValue(
+            f"{places[i + 1]}: a gap of {steps[i]:g} s after time = {times[i]:g} s: a step must be in "
+            f"(0, {GAP * median:g}] s, {GAP:g} times the median step"
+        )
+
+
+def _read(path: Path) -> tuple[FloatArray, FloatArray, list[int]]:
+    """Times (T,) s, coordinates (T, 6) in m and rad, and the lines they stand on."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as error:
+        raise InvalidValue(f"{path}: cannot be read: {error.strerror or error}") from error
+    except UnicodeDecodeError as error:
+        raise InvalidValue(f"{path}: must be a text file in UTF-8: {error}") from error
+    columns: list[tuple[int, float]] | None = None
+    rows: list[list[float]] = []
+    lines: list[int] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        cells = [cell.strip() for cell in line.split(",")]
+        if columns is None:
+            columns = _header(cells, f"{path}, line {number}")
+            continue
+        if len(cells) != len(columns):
+            raise InvalidValue(f"{path}, line {number}: {len(cells)} columns: must be {len(columns)}, as in the header")
+        rows.append([_number(cells[place], scale, f"{path}, line {number}") for place, scale in columns])
+        lines.append(number)
+    if columns is None:
+        raise InvalidValue(f"{path}: no header: must begin with a line like {_EXAMPLE}")
+    values = np.array(rows, dtype=np.float64).reshape(-1, 7)
+    return values[:, 0], values[:, 1:], lines
+
+
+def _header(cells: list[str], place: str) -> list[tuple[int, float]]:
+    """Column and scale to SI of time and of each coordinate."""
+    found: dict[str, tuple[int, float]] = {}
+    for column, cell in enumerate(cells):
+        name, _, unit = cell.lower().rpartition("_")
+        units = _UNITS.get(name)
+        if units is None:
+            raise InvalidValue(f"{place}: column {cell!r}: must be like {_EXAMPLE}")
+        if unit not in units:
+            raise InvalidValue(f"{place}: column {cell!r}: the unit of {name} must be one of {', '.join(units)}")
+        if name in found:
+            raise InvalidValue(f"{place}: column {name!r} occurs twice")
+        found[name] = (column, units[unit])
+    missing = [name for name in _UNITS if name not in found]
+    if missing:
+        raise InvalidValue(f"{place}: column {missing[0]!r} is missing: must be like {_EXAMPLE}")
+    return [found[name] for name in _UNITS]
+
+
+def _number(cell: str, scale: float, place: str) -> float:
+    try:
+        return float(cell) * scale
+    except ValueError:
+        raise InvalidValue(f"{place}: {cell!r} is not a number") from None

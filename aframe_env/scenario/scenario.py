@@ -1,0 +1,97 @@
+"""Scenario: everything that fixes one episode."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal
+
+from aframe_env.scenario.crane import GRAVITY, Crane
+from aframe_env.scenario.motion import HarmonicMotion, ShipMotion, has_components, is_tabled
+from aframe_env.validation import InvalidValue, require_choice, require_number
+
+Initial = Literal["comoving", "rest"]
+INITIALS: tuple[str, ...] = ("comoving", "rest")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scenario:
+    """Everything that fixes one episode: crane, ship motion, load, rope."""
+
+    crane: Crane = field(default_factory=Crane)
+    motion: ShipMotion = field(default_factory=HarmonicMotion.paper)
+    load_mass: float = 1.0e5
+    """m_L, kg."""
+    target_level: float = -300.0
+    """h, the required load coordinate x_L3, m; negative below the mean deck origin."""
+    rope_damping: float = 0.0
+    """d_R, N s/m."""
+    initial: Initial = "comoving"
+    """Whether the load starts with the pulley's velocity or at rest."""
+    ramp: float = 0.0
+    """Time over which the ship's motion builds up from nothing, s (a quintic smoothstep); 0 for none."""
+    gravity: float = GRAVITY
+    """g, m/s²."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.crane, Crane):
+            raise InvalidValue(f"crane = {self.crane!r}: must be a Crane")
+        if not (has_components(self.motion) or is_tabled(self.motion)):
+            raise InvalidValue(f"motion = {self.motion!r}: must be a ship motion (HarmonicMotion, SeaMotion, ...)")
+        require_number("load_mass", self.load_mass, "kg", low=0.0, high=1e7, low_open=True)
+        require_number("target_level", self.target_level, "m")
+        require_number("rope_damping", self.rope_damping, "N s/m", low=0.0, high=1e8)
+        require_choice("initial", self.initial, INITIALS)
+        require_number("ramp", self.ramp, "s", low=0.0, high=1e4)
+        require_number("gravity", self.gravity, "m/s²", low=0.0, high=100.0, low_open=True)
+        least, most = self.crane.winch.min_rope_length, self.crane.winch.max_rope_length
+        pulley = self.crane.pulley_position[2]
+        if self.target_level >= pulley:
+            raise InvalidValue(
+                f"target_level = {self.target_level!r} m: must be below the pulley, in (-inf, {pulley:g}) m"
+            )
+        breaking_load = self.crane.rope.breaking_load
+        if self.weight >= breaking_load:
+            raise InvalidValue(
+                f"load_mass = {self.load_mass!r} kg: must be in (0, {breaking_load / self.gravity:g}) kg, for the rope "
+                f"parts at {breaking_load:g} N"
+            )
+        if not least < self.free_length < most:
+            raise InvalidValue(
+                f"target_level = {self.target_level!r} m needs {self.free_length:g} m of unstretched rope between "
+                f"drum and load: must be in ({least:g}, {most:g}) m, the winch's limits"
+            )
+
+    @classmethod
+    def paper(cls, initial: Initial = "comoving", rope_damping: float = 0.0, **changes: Any) -> Scenario:
+        """Return the case of the paper's section 4 on the reference crane: motion (42), 100 t at h = -300 m.
+
+        ``changes`` replace further fields.
+        """
+        return cls(**{"initial": initial, "rope_damping": rope_damping, **changes})
+
+    @property
+    def rope_length(self) -> float:
+        """|LS| with the ship at rest and the load at its target, m."""
+        return self.crane.pulley_position[2] - self.target_level
+
+    @property
+    def weight(self) -> float:
+        """Weight of the load, N."""
+        return self.load_mass * self.gravity
+
+    @cached_property
+    def free_length(self) -> float:
+        """l_0, m: unstretched length between drum and load that holds the load at its target, ship at rest."""
+        return self.crane.free_length(self.rope_length, self.weight)
+
+    @property
+    def rope_stiffness(self) -> float:
+        """c_R = E_R F_R / l_0, N/m."""
+        return self.crane.rope.axial_stiffness / self.free_length
+
+    @property
+    def rope_frequency(self) -> float:
+        """Angular frequency of the load bobbing on the rope, rad/s."""
+        return math.sqrt(self.rope_stiffness / self.load_mass)

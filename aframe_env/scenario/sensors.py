@@ -1,0 +1,178 @@
+"""Sensors: what a real installation measures, with noise, delay, sampling and resolution."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from aframe_env.dynamics.compiling import kernel
+from aframe_env.dynamics.random import normal
+from aframe_env.validation import InvalidValue, require_number
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel:
+    """One measured quantity. Units are those of the quantity."""
+
+    noise: float = 0.0
+    """Standard deviation of the error."""
+    relative_noise: float = 0.0
+    """Standard deviation as a share of the quantity; the larger of the two holds."""
+    correlation_time: float = 0.0
+    """Time constant of the error (first-order Gauss-Markov process), s; 0 for white noise."""
+    period: float = 0.0
+    """Time between samples, held in between, s; 0 for a sample at every control step."""
+    resolution: float = 0.0
+    """Smallest step of the reading; 0 for none."""
+
+    def __post_init__(self) -> None:
+        for name in ("noise", "relative_noise", "resolution"):
+            require_number(name, getattr(self, name), "of the channel's unit", low=0.0, high=1e9)
+        require_number("correlation_time", self.correlation_time, "s", low=0.0, high=1e6)
+        require_number("period", self.period, "s", low=0.0, high=1e4)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensors:
+    """The sensors of an installation. The defaults follow data sheets of what is sold today.
+
+    The motion reference unit reports at the pulley (lever arms compensated): heave to the worse of 5 cm and 5 %,
+    roll and pitch to 0.03°; the drum has an encoder, the rope a load pin; the load's depth is slow and coarse.
+    """
+
+    delay: float = 0.1
+    """From a motion to its reading, s; for all channels."""
+    heave: Channel = field(default_factory=lambda: Channel(noise=0.05, relative_noise=0.05, correlation_time=30.0))
+    """Pulley's vertical displacement, m."""
+    heave_rate: Channel = field(default_factory=lambda: Channel(noise=0.01, relative_noise=0.01))
+    """Pulley's vertical velocity, m/s."""
+    roll: Channel = field(default_factory=lambda: Channel(noise=math.radians(0.03)))
+    """rad."""
+    pitch: Channel = field(default_factory=lambda: Channel(noise=math.radians(0.03)))
+    """rad."""
+    drum_angle: Channel = field(default_factory=lambda: Channel(resolution=2.0 * math.pi / 4096))
+    """rad."""
+    drum_speed: Channel = field(default_factory=lambda: Channel(noise=0.002))
+    """rad/s."""
+    tension: Channel = field(default_factory=lambda: Channel(noise=2.0e3, relative_noise=0.005))
+    """N."""
+    depth_error: Channel = field(default_factory=lambda: Channel(noise=0.05, period=1.0, resolution=0.01))
+    """x_L3 - h, m."""
+
+    def __post_init__(self) -> None:
+        require_number("delay", self.delay, "s", low=0.0, high=10.0)
+        for name in CHANNELS:
+            if not isinstance(getattr(self, name), Channel):
+                raise InvalidValue(f"{name} = {getattr(self, name)!r}: must be a Channel")
+
+    @classmethod
+    def ideal(cls) -> Sensors:
+        """Return the same channels without noise, delay, sampling or resolution."""
+        return cls(delay=0.0, **{name: Channel() for name in CHANNELS})
+
+
+CHANNELS = ("heave", "heave_rate", "roll", "pitch", "drum_angle", "drum_speed", "tension", "depth_error")
+
+
+class SensorBank:
+    """The sensors of many rows: from true quantities to readings, control step by control step."""
+
+    def __init__(self, sensors: Sensors, rows: int, control_period: float) -> None:
+        channels = [getattr(sensors, name) for name in CHANNELS]
+        self._noise = np.array([c.noise for c in channels])
+        self._relative = np.array([c.relative_noise for c in channels])
+        self._keep = np.array(
+            [math.exp(-control_period / c.correlation_time) if c.correlation_time else 0.0 for c in channels]
+        )
+        self._hold = np.array([max(1, round(c.period / control_period)) for c in channels], dtype=np.int64)
+        self._resolution = np.array([c.resolution for c in channels])
+        # A reading is the truth `delay` ago, interpolated between the control steps on either side.
+        whole = math.floor(sensors.delay / control_period + 1e-9)
+        self._weight = min(1.0, max(0.0, sensors.delay / control_period - whole))
+        self._memory = np.zeros((rows, whole + 2, len(CHANNELS)))
+        """(rows, past control steps with the newest first, channels)."""
+        self._error = np.zeros((rows, len(CHANNELS)))
+        self._reading = np.zeros((rows, len(CHANNELS)))
+        self._seed = np.zeros(rows, dtype=np.uint64)
+        self._count = np.zeros(rows, dtype=np.int64)
+
+    def reset_row(self, index: int, truth: FloatArray, seed: int) -> None:
+        """Start a row that has been at ``truth`` (channels,) for ever, with its own noise."""
+        self._memory[index] = truth
+        self._error[index] = 0.0
+        self._seed[index] = seed
+        self._count[index] = 0
+        self._measure(slice(index, index + 1))
+
+    def measure(self, truth: FloatArray) -> FloatArray:
+        """Readings (rows, channels) one control step later, the truth being ``truth`` (rows, channels)."""
+        self._memory[:, 1:] = self._memory[:, :-1].copy()
+        self._memory[:, 0] = truth
+        self._measure(slice(None))
+        return self._reading
+
+    @property
+    def readings(self) -> FloatArray:
+        """The latest readings, (rows, channels)."""
+        return self._reading
+
+    def copy_row(self, index: int) -> tuple[FloatArray, FloatArray, FloatArray, int, int]:
+        """Return everything that the row's further readings depend on."""
+        return (
+            self._memory[index].copy(),
+            self._error[index].copy(),
+            self._reading[index].copy(),
+            int(self._seed[index]),
+            int(self._count[index]),
+        )
+
+    def write_row(self, index: int, state: tuple[FloatArray, FloatArray, FloatArray, int, int]) -> None:
+        """Put back what ``copy_row`` returned."""
+        self._memory[index], self._error[index], self._reading[index] = state[:3]
+        self._seed[index], self._count[index] = state[3:]
+
+    def _measure(self, rows: slice) -> None:
+        _read_kernel()(
+            self._memory[rows],
+            self._weight,
+            self._noise,
+            self._relative,
+            self._keep,
+            self._hold,
+            self._resolution,
+            self._seed[rows],
+            self._count[rows],
+            self._error[rows],
+            self._reading[rows],
+        )
+
+
+@cache
+def _read_kernel():  # type: ignore[no-untyped-def]
+
+    @kernel
+    def read(memory, weight, noise, relative, keep, hold, resolution, seed, count, error, reading):  # type: ignore[no-untyped-def]
+        rows, past, channels = memory.shape
+        for i in range(rows):
+            for c in range(channels):
+                draw = normal(seed[i], count[i] * channels + c)
+                fresh = math.sqrt(1.0 - keep[c] * keep[c])
+                if count[i] == 0:
+                    error[i, c] = draw
+                else:
+                    error[i, c] = keep[c] * error[i, c] + fresh * draw
+                if count[i] % hold[c] == 0:
+                    truth = (1.0 - weight) * memory[i, past - 2, c] + weight * memory[i, past - 1, c]
+                    value = truth + error[i, c] * max(noise[c], relative[c] * abs(truth))
+                    if resolution[c] > 0.0:
+                        value = round(value / resolution[c]) * resolution[c]
+                    reading[i, c] = value
+            count[i] += 1
+
+    return read

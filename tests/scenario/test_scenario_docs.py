@@ -1,0 +1,91 @@
+"""The page on scenario files says what the reader of them does."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import MISSING, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from aframe_env import Crane, Frame, Harmonic, RecordedMotion, Rope, Scenario, Sea, Vessel, Winch, read_scenario
+from aframe_env.scenario.cross_sections import FrameStructure, Material, Servomotor
+from aframe_env.scenario.file import _SECTIONS, _Recorded, _SeaMotion
+
+PAGE = (Path(__file__).parents[1] / "docs" / "scenario-files.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```(\w+)\n(.*?)```", PAGE, flags=re.DOTALL)
+TABLES = {
+    Scenario: "## Top level",
+    Harmonic: '### `kind = "harmonic"`',
+    _SeaMotion: '### `kind = "sea"`',
+    Sea: "`[motion.sea]`:",
+    _Recorded: '### `kind = "recorded"`',
+    Crane: "## `[crane]`",
+    Rope: "`[crane.rope]`:",
+    Winch: "`[crane.winch]`:",
+    Frame: "`[crane.frame]`:",
+    FrameStructure: "### `[crane.frame.structure]`",
+    Material: "`[crane.frame.structure.material]`:",
+    Servomotor: "`[crane.frame.structure.servomotor]`:",
+}
+ELSEWHERE = {"crane", "motion"}
+"""Keys of a scenario that have sections of their own."""
+
+
+def rows(heading: str) -> dict[str, str]:
+    """Keys of the first table after a heading, and their defaults."""
+    after = PAGE.split(f"\n{heading}", 1)[1]
+    lines = after[after.index("| key ") :].split("\n\n", 1)[0].splitlines()[2:]
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    return {line[0].strip("`"): line[1] for line in cells}
+
+
+def default_of(item: Any) -> Any:
+    return item.default if item.default_factory is MISSING else item.default_factory()
+
+
+@pytest.mark.parametrize("kind", TABLES)
+def test_every_key_is_there_with_its_default(kind: type) -> None:
+    documented = rows(TABLES[kind])
+    known = {item.name: default_of(item) for item in fields(kind)}  # type: ignore[arg-type]
+    assert set(documented) == set(known) - ELSEWHERE
+    for name, text in documented.items():
+        default = known[name]
+        if default is MISSING or is_dataclass(default):
+            assert text in ("", "the reference crane's")
+        elif default is None:
+            assert text in ("none", "the vessel's")
+        else:
+            value = tomllib.loads(f"x = {text}")["x"]
+            if isinstance(default, float):
+                assert value == pytest.approx(default, rel=1e-5)
+            else:
+                assert value == (list(default) if isinstance(default, tuple) else default)
+
+
+def test_every_section_is_there_with_its_keys() -> None:
+    for name, kind in _SECTIONS.items():
+        (line,) = re.findall(rf'^\| "{name}" \| (.*) \|$', PAGE, flags=re.MULTILINE)
+        assert set(re.findall(r"`(\w+)`", line)) == {item.name for item in fields(kind)}
+
+
+def test_the_examples_are_read(tmp_path: Path) -> None:
+    examples = [text for language, text in BLOCKS if language == "toml"]
+    assert len(examples) >= 3
+    for text in examples:
+        (tmp_path / "example.toml").write_text(text, encoding="utf-8")
+        assert read_scenario(tmp_path / "example.toml") != Scenario.paper()
+
+
+def test_the_csv_examples_are_read(tmp_path: Path) -> None:
+    record, response = (text.splitlines() for language, text in BLOCKS if language == "csv")
+    # Two samples are no record, and one frequency in two headings no ship: they go on in the same manner.
+    more = [re.sub(r"^[\d.]+", f"{0.5 * k}", record[-1]) for k in range(2, 14)]
+    (tmp_path / "record.csv").write_text("\n".join([*record, *more]))
+    assert RecordedMotion.from_csv(tmp_path / "record.csv").duration == 6.5
+    values = response[-1].split(",", 2)[2]
+    others = [f"{omega},{heading},{values}" for omega in (0.1, 0.2) for heading in (0, 45, 90, 135, 180)]
+    (tmp_path / "ship.csv").write_text("\n".join([*response, *others[2:]]))
+    assert Vessel.from_csv(tmp_path / "ship.csv").name == "my ship"

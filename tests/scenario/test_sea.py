@@ -1,0 +1,169 @@
+"""Random seas: the spectrum against its formula, realisations against the spectrum's own moments."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.integrate import simpson
+from scipy.interpolate import RegularGridInterpolator
+from waveresponse import JONSWAP
+
+from aframe_env import Sea, SeaMotion, Vessel
+from aframe_env.scenario.sea import dnv_gamma
+
+FloatArray = npt.NDArray[np.float64]
+SUPPLY = Vessel.supply()
+SEEDS = 400
+# A mean over seeds may be four of its standard errors off. Quantiles are tabled at 2048 steps, which makes the last
+# 1/2048 of the energy a little too quick: 0.5 % of the second moment.
+TABLE_ERROR = 5e-3
+
+
+def jonswap(x: FloatArray, gamma: float) -> FloatArray:
+    """JONSWAP's shape over ω/ω_p (Hasselmann et al. 1973)."""
+    width = np.where(x <= 1.0, 0.07, 0.09)
+    return np.asarray(x**-5 * np.exp(-1.25 * x**-4) * gamma ** np.exp(-((x - 1.0) ** 2) / (2.0 * width**2)))
+
+
+def expected_density(sea: Sea) -> tuple[FloatArray, FloatArray]:
+    """Frequencies, finely, and the spectral density by the formula, with 4 √m0 = Hs."""
+    x = np.linspace(0.2, 8.0, 78_001)
+    shape = jonswap(x, sea.peak_enhancement)
+    omega = 2.0 * math.pi / sea.tp * x
+    return omega, shape * sea.hs**2 / 16.0 / simpson(shape, x=omega)
+
+
+def close_in_the_mean(samples: FloatArray, expected: float) -> bool:
+    error = 4.0 * samples.std(ddof=1) / math.sqrt(len(samples))
+    return bool(abs(samples.mean() - expected) < error + TABLE_ERROR * abs(expected))
+
+
+def sea(seed: int = 0, **changes: object) -> Sea:
+    return Sea(**{"hs": 3.0, "tp": 9.0, "seed": seed, **changes})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("spectrum", "gamma"), [("jonswap", 3.3), ("jonswap", 1.0), ("pierson-moskowitz", 3.3)])
+def test_density_is_jonswaps_formula(spectrum: str, gamma: float) -> None:
+    state = sea(spectrum=spectrum, gamma=gamma)
+    omega, density = expected_density(state)
+    np.testing.assert_allclose(state.density(omega), density, rtol=1e-4, atol=1e-12)
+    assert state.density([0.0, -1.0]).tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("gamma", [1.0, 2.4, 3.3, 7.0])
+def test_density_is_that_of_waveresponse(gamma: float) -> None:
+    state = sea(gamma=gamma)
+    omega = np.linspace(0.3, 5.0, 200)
+    _, expected = JONSWAP(omega)(state.hs, state.tp, gamma=gamma)
+    # Theirs has Hs through an approximation in γ, which is off by up to a few per cent.
+    density = state.density(omega)
+    ratio = density / expected
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-12)
+    assert ratio[0] == pytest.approx(1.0, abs=0.03)
+
+
+def test_every_realisation_has_the_energy_of_its_spectrum() -> None:
+    for seed in range(20):
+        for spreading in (None, 4):
+            waves = sea(seed, spreading=spreading).waves()
+            assert 4.0 * math.sqrt((waves.amplitude**2).sum() / 2.0) == pytest.approx(3.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(("components", "gamma"), [(32, 3.3), (8, 1.0), (32, 2.44)])
+def test_spectral_moments_are_met_in_the_mean(components: int, gamma: float) -> None:
+    omega, density = expected_density(sea(gamma=gamma))
+    for order in (-1, 1, 2):
+        samples = []
+        for seed in range(SEEDS):
+            waves = sea(seed, components=components, gamma=gamma).waves()
+            samples.append(float((waves.amplitude**2 * waves.frequency**order).sum() / 2.0))
+        assert close_in_the_mean(np.array(samples), simpson(omega**order * density, x=omega)), order
+
+
+def test_elevation_has_the_significant_wave_height() -> None:
+    """Independent samples of elevation, one a seed and time: of zero mean and variance Hs²/16, nearly normal."""
+    count = 4000
+    samples = np.array([float(sea(seed).waves().elevation(7.0 + seed)) for seed in range(count)])
+    variance = 9.0 / 16.0
+    assert abs(samples.mean()) < 4.0 * math.sqrt(variance / count)
+    assert abs(samples.var() - variance) < 4.0 * variance * math.sqrt(2.0 / count)
+    assert (samples**4).mean() / variance**2 == pytest.approx(3.0, abs=4.0 * math.sqrt(96.0 / count))
+
+
+def test_elevation_in_time_has_the_significant_wave_height() -> None:
+    times = np.arange(0.0, 20000.0, 0.5)
+    assert 4.0 * sea(1).waves().elevation(times).std() == pytest.approx(3.0, rel=0.01)
+
+
+def pulley_heave(state: Sea) -> FloatArray:
+    """Heave amplitudes (K,) of the pulley: the deck's heave, less x times its pitch (small angles)."""
+    response = SeaMotion(sea=state).components().response
+    return np.asarray(np.abs(response[:, 2] - 5.0714191409 * response[:, 4]))
+
+
+@pytest.mark.parametrize("heading", [math.pi, 2.0, 0.3, 5.5])
+def test_heave_has_the_deviation_of_response_and_spectrum(heading: float) -> None:
+    """Σ a²/2 over realisations against ∫ |RAO|² S, with SciPy's interpolation of the vessel's table."""
+    table = SUPPLY.deck_response[..., 2] - 5.0714191409 * SUPPLY.deck_response[..., 4]
+    rao = RegularGridInterpolator((SUPPLY.frequencies, SUPPLY.headings), table)
+
+    omega, density = expected_density(sea())
+    held = np.clip(omega, SUPPLY.frequencies[0], SUPPLY.frequencies[-1])
+    squared = np.abs(rao(np.column_stack([held, np.full_like(held, heading)]))) ** 2
+    samples = np.array([(pulley_heave(sea(seed, heading=heading)) ** 2).sum() / 2.0 for seed in range(SEEDS)])
+    assert close_in_the_mean(samples, simpson(squared * density, x=omega))
+
+
+def test_headings_are_periodic() -> None:
+    for heading in (0.0, 1.0, math.pi, 6.0):
+        one = SeaMotion(sea=sea(heading=heading)).components()
+        other = SeaMotion(sea=sea(heading=heading - 2.0 * math.pi)).components()
+        np.testing.assert_allclose(other.response, one.response, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("s", [1, 4, 25])
+def test_directions_spread_as_cos_2s(s: int) -> None:
+    """The mean of cos θ under cos^2s(θ/2) is s/(s + 1); as many waves come from either side."""
+    waves = [sea(seed, heading=1.0, spreading=s).waves() for seed in range(100)]
+    angle = np.concatenate([w.direction for w in waves]) - 1.0
+    count = len(angle)
+    assert abs(np.cos(angle).mean() - s / (s + 1)) < 4.0 * np.cos(angle).std() / math.sqrt(count) + 1e-3
+    assert abs(np.sin(angle).mean()) < 4.0 * np.sin(angle).std() / math.sqrt(count)
+
+
+def test_phases_are_uniform_and_independent_of_frequency() -> None:
+    waves = [sea(seed).waves() for seed in range(200)]
+    phase = np.concatenate([w.phase for w in waves])
+    frequency = np.concatenate([w.frequency for w in waves])
+    bound = 4.0 / math.sqrt(len(phase))
+    assert abs(np.exp(1j * phase).mean()) < bound
+    assert abs(np.exp(2j * phase).mean()) < bound
+    assert abs(np.corrcoef(phase, frequency)[0, 1]) < bound
+
+
+def test_seed_makes_the_sea() -> None:
+    one, again, other = sea(5).waves(), sea(5).waves(), sea(6).waves()
+    np.testing.assert_array_equal(one.frequency, again.frequency)
+    np.testing.assert_array_equal(one.phase, again.phase)
+    assert not np.isclose(one.phase, other.phase).any()
+
+
+def test_no_realisation_repeats_itself() -> None:
+    """Frequencies are no multiples of a common one, as those of an equidistant grid are."""
+    gaps = np.diff(sea(0).waves().frequency)
+    assert (gaps > 0.0).all()
+    assert len(np.unique(np.round(gaps, 12))) == len(gaps)
+
+
+def test_gamma_of_dnv() -> None:
+    """DNV-RP-C205, 3.5.5.5: 5 for Tp/√Hs ≤ 3.6, 1 from 5 on, exp(5.75 - 1.15 Tp/√Hs) between."""
+    assert dnv_gamma(4.0, 7.0) == 5.0
+    assert dnv_gamma(4.0, 10.1) == 1.0
+    assert dnv_gamma(4.0, 8.6) == pytest.approx(math.exp(5.75 - 1.15 * 4.3))
+
+
+def test_calm_sea_moves_nothing() -> None:
+    assert not SeaMotion(sea=sea(hs=0.0)).components().response.any()

@@ -1,0 +1,173 @@
+"""The default vessel against long-wave theory and another program's ship; the CSV format."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from waveresponse import JONSWAP
+
+from aframe_env.scenario.sea import Sea, SeaMotion
+from aframe_env.scenario.vessel import COLUMNS, Vessel
+from aframe_env.validation import InvalidValue
+
+MSS = Path(__file__).parent / "data" / "mss_supply_motion_rao.csv"
+SUPPLY = Vessel.supply()
+
+
+def mss_response() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Frequencies, headings [deg], response (F, D, 6) of the MSS ship, in this package's conventions.
+
+    The source has x forward, y to starboard, z down: sway, heave, pitch and yaw change sign. Its elevation is
+    positive upwards, its heading 180° a head sea, as here.
+    """
+    data = np.loadtxt(MSS, delimiter=",", skiprows=6)
+    frequencies, headings = np.unique(data[:, 0]), np.unique(data[:, 1])
+    data = data[np.lexsort((data[:, 1], data[:, 0]))].reshape(len(frequencies), len(headings), 14)
+    response = data[:, :, 2::2] * np.exp(1j * data[:, :, 3::2])
+    return frequencies, headings, response * np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
+
+
+def heading(degrees: float) -> int:
+    return int(np.argmin(np.abs(SUPPLY.headings - math.radians(degrees))))
+
+
+@pytest.mark.parametrize("degrees", [0, 45, 90, 135, 180, 270])
+def test_long_waves_carry_the_ship(degrees: float) -> None:
+    # A particle of a wave travelling towards β follows (-i cos β, -i sin β, 1); the deck follows the slope.
+    k = SUPPLY.frequencies[0] ** 2 / 9.81
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    surge, sway, heave, roll, pitch, _ = SUPPLY.response[0, heading(degrees)]
+    assert surge == pytest.approx(-1j * c, abs=0.02)
+    assert sway == pytest.approx(-1j * s, abs=0.02)
+    assert heave == pytest.approx(1.0, abs=0.01)
+    assert roll / k == pytest.approx(-1j * s, abs=0.05)
+    assert pitch / k == pytest.approx(1j * c, abs=0.02)
+
+
+def test_short_waves_leave_the_ship_alone() -> None:
+    assert np.abs(SUPPLY.response[-1]).max() < 0.03
+
+
+def test_port_and_starboard_mirror() -> None:
+    a, b = SUPPLY.response[:, heading(60)], SUPPLY.response[:, heading(300)]
+    np.testing.assert_allclose(a * [1, -1, 1, -1, 1, -1], b, atol=1e-12)
+
+
+@pytest.mark.parametrize(("degrees", "dof", "bound"), [(180, 2, 0.02), (180, 4, 0.002), (90, 2, 0.04), (0, 4, 0.004)])
+def test_like_a_real_supply_ship(degrees: float, dof: int, bound: float) -> None:
+    # Another hull of the same main dimensions by another program: amplitudes below 0.75 rad/s (8.4 s and longer), in
+    # m/m and rad/m. Their greatest pitch is 0.041 rad/m. Phases of pitch differ with the hulls' fore-aft asymmetry.
+    frequencies, headings, other = mss_response()
+    j = int(np.flatnonzero(headings == degrees)[0])
+    band = frequencies < 0.75
+    ours = np.interp(frequencies, SUPPLY.frequencies, np.abs(SUPPLY.response[:, heading(degrees), dof]))
+    assert np.abs(ours - np.abs(other[:, j, dof]))[band].max() < bound
+
+
+def test_heave_phase_of_a_real_supply_ship() -> None:
+    frequencies, headings, other = mss_response()
+    theirs = other[:, np.flatnonzero(headings == 180.0)[0], 2]
+    ours = np.interp(frequencies, SUPPLY.frequencies, SUPPLY.response[:, heading(180), 2])
+    large = np.abs(theirs) > 0.5
+    assert np.abs(np.angle(ours / theirs))[large].max() < 0.05
+
+
+def _stern_heave(pitch_sign: float) -> float:
+    """Standard deviation of the heave 45 m aft in a head sea (Hs 2.5 m, Tp 9 s, γ 3.3) of the MSS ship."""
+    frequencies, headings, response = mss_response()
+    head = response[:, np.flatnonzero(headings == 180.0)[0]]
+    stern = head[:, 2] + pitch_sign * 45.0 * head[:, 4]
+    omega = np.linspace(0.2, 2.5, 4000)
+    amplitude = np.interp(omega, frequencies, np.abs(stern))
+    density = JONSWAP(omega)(2.5, 9.0, gamma=3.3)[1]
+    return math.sqrt(np.trapezoid(amplitude**2 * density, omega))
+
+
+def test_sign_of_pitch_at_the_stern() -> None:
+    # Bow-down pitch (positive here) lifts the stern.
+    assert _stern_heave(+1.0) == pytest.approx(0.90, abs=0.01)
+    assert _stern_heave(-1.0) == pytest.approx(1.13, abs=0.01)
+
+
+def test_lever_of_another_point() -> None:
+    position = (-45.0, 3.0, 4.0)
+    moved = SUPPLY.response_at(position)
+    x, y, _z = np.array(position) - SUPPLY.reference_point
+    expected = SUPPLY.response[..., 2] + y * SUPPLY.response[..., 3] - x * SUPPLY.response[..., 4]
+    np.testing.assert_allclose(moved[..., 2], expected, rtol=1e-12)
+    np.testing.assert_array_equal(moved[..., 3:], SUPPLY.response[..., 3:])
+
+
+def test_stern_of_ours_moves_like_theirs() -> None:
+    j = heading(180)
+    stern = SUPPLY.response_at((-45.0, 0.0, 0.0))[:, j, 2]
+    omega = np.linspace(0.2, 2.5, 4000)
+    density = JONSWAP(omega)(2.5, 9.0, gamma=3.3)[1]
+    deviation = math.sqrt(np.trapezoid(np.interp(omega, SUPPLY.frequencies, np.abs(stern)) ** 2 * density, omega))
+    assert deviation == pytest.approx(_stern_heave(+1.0), rel=0.2)
+
+
+def test_deck_axes_are_turned_half_round() -> None:
+    vessel = Vessel(
+        name="v",
+        frequencies=SUPPLY.frequencies,
+        headings=SUPPLY.headings,
+        response=SUPPLY.response,
+        reference_point=SUPPLY.reference_point,
+        deck_position=SUPPLY.reference_point,
+    )
+    np.testing.assert_allclose(vessel.deck_response, SUPPLY.response * [-1, -1, 1, -1, -1, 1])
+
+
+def _text(change: tuple[str, str] | None = None) -> str:
+    lines = [",".join(COLUMNS)]
+    for omega in (0.5, 1.0):
+        for degrees in (0, 45, 90, 135, 180):
+            lines.append(f"{omega},{degrees}," + ",".join(["1.0", "0.5"] * 6))
+    text = "\n".join(["# title: box", "# reference_point_m: 1, 0, -2", *lines])
+    return text.replace(*change, 1) if change else text
+
+
+def test_own_vessel(tmp_path: Path) -> None:
+    path = tmp_path / "own.csv"
+    path.write_text(_text())
+    vessel = Vessel.from_csv(path, deck_position=(-10.0, 0.0, 2.0))
+    assert (vessel.name, vessel.reference_point, vessel.deck_position) == ("box", (1, 0, -2), (-10, 0, 2))
+    assert vessel.response.shape == (2, 9, 6)
+    np.testing.assert_allclose(vessel.response[0, 0], np.exp(0.5j))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("0.5,45,1.0", "0.5,45,x"), r"line 5: surge_amp = 'x': must be a number"),
+        (("0.5,45,1.0", "0.5,45,nan"), r"line 5: surge_amp = 'nan': must be finite"),
+        (("0.5,45,1.0", "0.5,45,-1.0"), r"line 5: surge_amp = -1: must not be negative"),
+        (("0.5,45,", "0.5,450,"), r"line 5: heading_deg = 450°"),
+        (("0.5,45,", "-0.5,45,"), r"line 5: omega_rad_s = -0.5 rad/s"),
+        (("0.5,45,", "0.5,0,"), r"the row of 0.5 rad/s and 0° is there 2 times"),
+        (("0.5,45," + ",".join(["1.0", "0.5"] * 6), ""), r"the row of 0.5 rad/s and 45° is missing"),
+        (("omega_rad_s", "omega"), r"line 3: the columns must be"),
+        (("# reference_point_m: 1, 0, -2", "# reference_point_m: 1, 0"), r"line 2: reference_point_m"),
+        (("0.5,45,1.0,", "0.5,45,"), r"line 5: 13 columns: must be 14"),
+    ],
+)
+def test_bad_vessel_names_file_and_line(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+    path = tmp_path / "bad.csv"
+    path.write_text(_text(change))
+    with pytest.raises(InvalidValue, match=message):
+        Vessel.from_csv(path)
+
+
+def test_repr_leaves_the_tables_out() -> None:
+    text = repr(SeaMotion(sea=Sea(hs=2.0, tp=8.0)))
+    assert Vessel.supply().name in text
+    assert "array" not in text
+
+
+def test_missing_vessel(tmp_path: Path) -> None:
+    with pytest.raises(InvalidValue, match="cannot be read"):
+        Vessel.from_csv(tmp_path / "none.csv")
