@@ -1,5 +1,5 @@
 """Policies for AFrameHeave: optimised drives, feedback laws, learned agents, all behind one protocol."""
 
-from agents.learned import load
+from agents.learned.agent import load
 
 __all__ = ["load"]

@@ -17,7 +17,7 @@ from stable_baselines3.sac.policies import Actor as SACActor
 from stable_baselines3.sac.policies import SACPolicy
 from torch import nn
 
-from agents.network import Actor, perceptron
+from agents.learned.network import Actor, perceptron
 
 
 class ActorLatent(nn.Module):

@@ -1,8 +1,8 @@
 """The bridge from the native vector environment to Stable-Baselines3, with what training needs on top.
 
-Actions are outputs of the agent's network and observations its inputs (see ``agents.features``); the reward is the
-depth error's root mean square over the step in place of its square, so that its gradient does not vanish near zero and
-a small sea weighs as much as a large one; an episode is cut, with the value of its last state, where the load has
+Actions are outputs of the agent's network and observations its inputs (see ``agents.learned.features``); the reward is
+the depth error's root mean square over the step in place of its square, so that its gradient does not vanish near zero
+and a small sea weighs as much as a large one; an episode is cut, with the value of its last state, where the load has
 drifted far off.
 None of this is in the environment, and evaluation has none of it.
 """
@@ -21,7 +21,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from aframe_env import task
 from aframe_env.scenario import ScenarioSource
 from aframe_env.simulation import Simulation
-from agents.features import LIMIT, STATE_FEATURES, StateFeatures, features_for
+from agents.learned.features import LIMIT, STATE_FEATURES, StateFeatures, features_for
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
@@ -104,7 +104,7 @@ class TrainingVecEnv(VecEnv):
         """What an observation of the environment consists of."""
         return self._simulation.quantities
 
-    def take_reduction(self) -> float:
+    def pop_reduction(self) -> float:
         """Median over the rows of the heave reduction since the last call, exploration included."""
         reduction = median_reduction(self._error_sum, self._still_sum)
         self._error_sum[:] = self._still_sum[:] = 0.0

@@ -22,9 +22,9 @@ from rich.console import Console
 from rich.progress import Progress
 
 from aframe_env.validation import InvalidValue, require_integer, require_number
-from agents import drive_map as module
-from agents import drives, objectives, optimisation
-from agents.drive_map import ARRAYS, CARD, DriveMap, Node, NodeDrive, optimise_node, serialise
+from agents.drives import functions, objectives, optimisation
+from agents.drives import map as module
+from agents.drives.map import ARRAYS, CARD, DriveMap, Node, NodeDrive, optimise_node, serialise
 from train.config import parse, to_toml
 from train.drive_map_study.figures import draw
 from train.drive_map_study.held_out import between_nodes, check
@@ -101,7 +101,7 @@ def run(options: Options, console: Console) -> int:
         options.out or Path("runs") / f"drive-map-{datetime.now():%Y%m%d-%H%M%S}", overwrite=options.overwrite
     )
     command = shlex.join(["python", "-m", "train.drive_map", *sys.argv[1:]])
-    version = version_of(module, drives, objectives, optimisation)
+    version = version_of(module, functions, objectives, optimisation)
     nodes = options.nodes
     try:
         with Progress(console=console) as bars:

@@ -22,8 +22,8 @@ from rich.table import Table
 from aframe_env.scenario import Initial, Scenario
 from aframe_env.scenario.file import read_scenario, scenario_text
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
-from agents.objectives import FINE_STEP, Objective, coarse_step
-from agents.optimisation import (
+from agents.drives.objectives import FINE_STEP, Objective, coarse_step
+from agents.drives.optimisation import (
     FAMILIES,
     OBJECTIVES,
     OPTIMISERS,
@@ -33,7 +33,7 @@ from agents.optimisation import (
     optimise,
     required_angle,
 )
-from agents.optimisation import Progress as SearchProgress
+from agents.drives.optimisation import Progress as SearchProgress
 from train.config import parse
 from train.drive_experiment.figures import draw
 from train.drive_experiment.full_model import transfer

@@ -1,7 +1,7 @@
 """Compare policies on the same held-out scenarios: ``python -m train.evaluate --policies results/agents/ppo S-Ω1``.
 
 A policy is a name ("S-Ω1", or s-omega1 on a keyboard without Ω), the folder of an agent, or module:function for your
-own: see ``agents.catalogue``. The drum left alone is always there as the yardstick. Writes the table (Markdown, JSON,
+own: see ``agents.registry``. The drum left alone is always there as the yardstick. Writes the table (Markdown, JSON,
 PNG), every episode (CSV, Parquet), and report.html: one page with figures, pictures and the worst cases, which opens in
 any browser, offline.
 """
@@ -18,7 +18,7 @@ from pathlib import Path
 from rich.console import Console
 
 from aframe_env.validation import InvalidValue
-from agents.catalogue import choose_all
+from agents.registry import choose_all
 from train.config import parse, to_toml
 from train.held_out import AFTER_TRAINING, HeldOut, run_all, write
 from train.output import new_folder, user_errors, versions, write_json, write_text

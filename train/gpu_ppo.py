@@ -27,8 +27,8 @@ from aframe_env.cuda.device import open_device
 from aframe_env.scenario import ScenarioDistribution
 from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
 from aframe_env.validation import InvalidValue, require_integer
-from agents.network import Actor
-from agents.tensor_features import TensorStateFeatures
+from agents.learned.network import Actor
+from agents.learned.tensor_features import TensorStateFeatures
 from train import ppo
 from train.actor_critic import ActorLatent, CriticLatent, actor_of
 from train.config import parse

@@ -15,10 +15,10 @@ from aframe_env import task
 from aframe_env.flexible_engine import mesh_of
 from aframe_env.scenario import Scenario, ScenarioDistribution
 from aframe_env.validation import require_integer
-from agents.catalogue import DRUM_STILL, Choice, Setting, as_choice, choose_all
+from agents.drives.tuned import TUNED
 from agents.policy import Knowledge, Policy
+from agents.registry import DRUM_STILL, BuildContext, PolicySpec, as_spec, choose_all
 from agents.rollout import Episodes, held_out_scenarios, run
-from agents.tuned_drives import TUNED
 from train.comparison import Entry, Row, compare, rich_table, write_comparison
 from train.figures import comparison_figure
 from train.tasks import run_tasks
@@ -75,7 +75,7 @@ class Comparison:
         return compare(self.entries, self.still)
 
 
-def run_all(choices: Sequence[Choice], held_out: HeldOut, console: Console) -> Comparison:
+def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console) -> Comparison:
     """Run the drum still and every policy that was chosen over the held-out scenarios."""
     distribution = ScenarioDistribution()
     scenarios = held_out_scenarios(distribution, held_out.scenarios)
@@ -84,20 +84,20 @@ def run_all(choices: Sequence[Choice], held_out: HeldOut, console: Console) -> C
     with Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
     ) as progress:
-        for choice in (DRUM_STILL, *(c for c in choices if c.name != DRUM_STILL.name)):
-            mine = first if choice.for_each_scenario else scenarios
+        for spec in (DRUM_STILL, *(c for c in specs if c.name != DRUM_STILL.name)):
+            mine = first if spec.for_each_scenario else scenarios
             if not mine:
                 continue
-            policy = choice.build(
-                Setting(
+            policy = spec.build(
+                BuildContext(
                     scenarios=mine,
                     nominal=distribution.nominal(),
                     episode_duration=DURATION,
                     observation=held_out.observation,
-                    spread=partial(run_tasks, progress=progress, description=f"{choice.name}: preparing"),
+                    spread=partial(run_tasks, progress=progress, description=f"{spec.name}: preparing"),
                 )
             )
-            bar = progress.add_task(choice.name, total=round(DURATION / CONTROL_PERIOD))
+            bar = progress.add_task(spec.name, total=round(DURATION / CONTROL_PERIOD))
             episodes = run(
                 policy,
                 mine,
@@ -108,7 +108,7 @@ def run_all(choices: Sequence[Choice], held_out: HeldOut, console: Console) -> C
                 rfem_modes=held_out.rfem_modes,
                 progress=lambda step, bar=bar: progress.update(bar, completed=step),  # type: ignore[misc]
             )
-            entries.append(Entry(choice.name, policy.knows, episodes))
+            entries.append(Entry(spec.name, policy.knows, episodes))
     return Comparison(tuple(entries), tuple(scenarios), held_out)
 
 
@@ -132,4 +132,4 @@ def write(folder: Path, comparison: Comparison, console: Console) -> None:
 def evaluate(policy: Policy, folder: Path, count: int, privileged: int, console: Console) -> None:
     """Compare an agent with the drum still and the paper's drives, and write the comparison into ``folder``."""
     held_out = HeldOut(scenarios=count, privileged=privileged)
-    write(folder, run_all([as_choice(policy), *choose_all(AFTER_TRAINING)], held_out, console), console)
+    write(folder, run_all([as_spec(policy), *choose_all(AFTER_TRAINING)], held_out, console), console)

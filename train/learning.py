@@ -21,9 +21,9 @@ from stable_baselines3.common.logger import Logger, configure
 from aframe_env import task
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
-from agents.features import feature_names
-from agents.learned import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, serialise
-from agents.network import Actor
+from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, serialise
+from agents.learned.features import feature_names
+from agents.learned.network import Actor
 from train.bridge import TrainingVecEnv
 from train.config import to_toml
 from train.held_out import evaluate
@@ -133,7 +133,7 @@ class Rows(Protocol):
         """Start all rows."""
         ...
 
-    def take_reduction(self) -> float:
+    def pop_reduction(self) -> float:
         """Heave reduction over all steps since the last call."""
         ...
 
@@ -183,7 +183,7 @@ class ShowReduction(BaseCallback):
         if self.num_timesteps < self._next:
             return
         self._next = self.num_timesteps + self._interval
-        reduction = self._rows.take_reduction()
+        reduction = self._rows.pop_reduction()
         self.logger.record("rollout/heave_reduction", reduction)
         self._progress.update(
             self._task,

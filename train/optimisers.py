@@ -17,8 +17,8 @@ from rich.progress import Progress
 
 from aframe_env.scenario import ScenarioDistribution
 from aframe_env.validation import require_integer
-from agents.objectives import Objective, coarse_step
-from agents.optimisation import FAMILIES, OPTIMISERS, Family, Optimiser, optimise
+from agents.drives.objectives import Objective, coarse_step
+from agents.drives.optimisation import FAMILIES, OPTIMISERS, Family, Optimiser, optimise
 from agents.rollout import held_out_scenarios
 from train.config import parse
 from train.drives import paper_case

@@ -19,14 +19,14 @@ from rich.progress import Progress
 
 from aframe_env.scenario import Scenario, ScenarioDistribution
 from aframe_env.validation import InvalidValue, require_choice, require_integer
-from agents import drive_map
-from agents.catalogue import Setting, choose
-from agents.drive_map_policy import DriveMapPolicy
-from agents.drive_policy import DrivePolicy
-from agents.optimisation import OPTIMISERS, OptimisedDrive, Optimiser
+from agents.drives import map as drive_map
+from agents.drives.map_policy import DriveMapPolicy
+from agents.drives.optimisation import OPTIMISERS, OptimisedDrive, Optimiser
+from agents.drives.policy import DrivePolicy
+from agents.drives.tuned import TUNED
 from agents.policy import DrumStill, FloatArray, Knowledge, Policy
+from agents.registry import BuildContext, choose
 from agents.rollout import held_out_scenarios, run
-from agents.tuned_drives import TUNED
 from train.config import parse, to_toml
 from train.output import new_folder, user_errors, versions, write_json, write_text
 from train.sensitivity_study.analysis import Sensitivity, analyse
@@ -107,7 +107,7 @@ def _policy(task: Task) -> Policy:
     if task.name in TUNED:
         return DrivePolicy(task.name, task.drives, Knowledge.FUTURE)
     scenarios = assumed_scenarios(task.options)
-    setting = Setting(
+    setting = BuildContext(
         scenarios=scenarios, nominal=ScenarioDistribution().nominal(), episode_duration=DURATION, observation="state"
     )
     return choose(task.name).build(setting)

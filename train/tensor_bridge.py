@@ -9,7 +9,7 @@ from tensordict import TensorDict
 
 from aframe_env import task
 from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
-from agents.tensor_features import TensorStateFeatures
+from agents.learned.tensor_features import TensorStateFeatures
 from train.bridge import median_reduction, shaped
 
 _NAMES: Final = [quantity.name for quantity in task.STATE]
@@ -74,7 +74,7 @@ class TrainingRows:
         extras = {"time_outs": extras["time_outs"] | drifted}
         return self.get_observations(), rewards, dones | drifted, extras
 
-    def take_reduction(self) -> float:
+    def pop_reduction(self) -> float:
         """Median over the rows of the heave reduction since the last call, exploration included."""
         reduction = median_reduction(self._error_sum.cpu().numpy(), self._still_sum.cpu().numpy())
         self._error_sum.zero_()

@@ -9,8 +9,8 @@ from typing import Final
 from rich.progress import Progress
 
 from aframe_env.scenario import Scenario
-from agents.optimisation import OptimisedDrive, Optimiser
-from agents.tuned_drives import TUNED, optimised
+from agents.drives.optimisation import OptimisedDrive, Optimiser
+from agents.drives.tuned import TUNED, optimised
 from train.tasks import run_tasks
 
 DURATION: Final = 60.0

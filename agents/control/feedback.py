@@ -17,7 +17,7 @@ from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import require_number
 from agents.control.observer import PolynomialObserver
-from agents.control.regulator import Gains, Lifts, Observation, Regulator
+from agents.control.regulator import Gains, HoistBatch, Observation, Regulator
 from agents.policy import FloatArray, Knowledge
 
 STATE_GAINS = Gains(effort=0.087, share=0.018)
@@ -35,23 +35,23 @@ class StateFeedback:
     knows: Knowledge = field(init=False, default=Knowledge.STATE)
     _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
     _period: float = field(init=False, repr=False, default=0.1)
-    _lifts: Lifts | None = field(init=False, repr=False, default=None)
+    _hoists: HoistBatch | None = field(init=False, repr=False, default=None)
     _regulator: Regulator = field(init=False, repr=False)
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes; of the scenarios only the crane is looked at."""
-        self._scenarios, self._period, self._lifts = scenarios, control_period, None
+        self._scenarios, self._period, self._hoists = scenarios, control_period, None
 
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for observations (N, 14) of the full state."""
-        if self._lifts is None:
-            self._lifts = Lifts(len(observation), self._period, STATE)
-            self._lifts.start([s.crane for s in self._scenarios], observation)
-            self._regulator = self._lifts.regulator(self.gains)
-        lifts, period = self._lifts, self._period
-        winch, o = lifts.winch, lifts.columns(observation)
+        if self._hoists is None:
+            self._hoists = HoistBatch(len(observation), self._period, STATE)
+            self._hoists.start([s.crane for s in self._scenarios], observation)
+            self._regulator = self._hoists.regulator(self.gains)
+        hoists, period = self._hoists, self._period
+        winch, o = hoists.winch, hoists.columns(observation)
         winch.speed = o["drum_speed"]
-        rope_end = o["depth_error"] + lifts.stretch(o)
+        rope_end = o["depth_error"] + hoists.stretch(o)
         rope_end_speed = o["pulley_velocity_z"] - winch.radius * o["drum_speed"]
         z = np.stack([o["depth_error"], o["load_velocity_z"], rope_end, rope_end_speed], axis=1)
         rise = period * (o["pulley_velocity_z"] + 0.5 * period * o["pulley_acceleration_z"])
@@ -74,7 +74,7 @@ class SensorFeedback:
     knows: Knowledge = field(init=False, default=Knowledge.SENSORS)
     _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
     _period: float = field(init=False, repr=False, default=0.1)
-    _lifts: Lifts | None = field(init=False, repr=False, default=None)
+    _hoists: HoistBatch | None = field(init=False, repr=False, default=None)
     _regulator: Regulator = field(init=False, repr=False)
     _observer: PolynomialObserver = field(init=False, repr=False)
     _turned: FloatArray = field(init=False, repr=False)
@@ -84,20 +84,20 @@ class SensorFeedback:
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes; of the scenarios only the crane is looked at."""
-        self._scenarios, self._period, self._lifts = scenarios, control_period, None
+        self._scenarios, self._period, self._hoists = scenarios, control_period, None
 
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for readings (N, 10)."""
-        if self._lifts is None:
-            lifts = self._lifts = Lifts(len(observation), self._period, SENSED)
-            o = lifts.start([s.crane for s in self._scenarios], observation)
-            self._regulator = lifts.regulator(self.gains)
-            self._observer = PolynomialObserver(lifts, self.gains.damping_ratio, self.delay)
+        if self._hoists is None:
+            hoists = self._hoists = HoistBatch(len(observation), self._period, SENSED)
+            o = hoists.start([s.crane for s in self._scenarios], observation)
+            self._regulator = hoists.regulator(self.gains)
+            self._observer = PolynomialObserver(hoists, self.gains.damping_ratio, self.delay)
             self._observer.start(o)
         else:
-            lifts = self._lifts
-            self._observer.advance(self._turned, lifts.columns(observation))
+            hoists = self._hoists
+            self._observer.advance(self._turned, hoists.columns(observation))
         rise = self._observer.rises(1)[0]
-        wanted = (rise - self._period * self._regulator.speed(self._observer.state())) / lifts.winch.radius
-        command, self._turned = lifts.winch.command(wanted)
+        wanted = (rise - self._period * self._regulator.speed(self._observer.state())) / hoists.winch.radius
+        command, self._turned = hoists.winch.command(wanted)
         return command

@@ -11,7 +11,7 @@ from aframe_env.dynamics import layout as at
 from aframe_env.engine import Engine
 from aframe_env.scenario import Scenario
 from aframe_env.task import STATE
-from agents.control.regulator import Gains, Lifts, Observation, Regulator
+from agents.control.regulator import Gains, HoistBatch, Observation, Regulator
 from agents.policy import FloatArray, Knowledge
 
 GAINS = Gains(effort=0.069, share=0.016)
@@ -73,7 +73,7 @@ class InverseDynamics:
     gains: Gains = GAINS
     name: str = "inverse dynamics"
     knows: Knowledge = field(init=False, default=Knowledge.FUTURE)
-    _lifts: Lifts | None = field(init=False, repr=False, default=None)
+    _hoists: HoistBatch | None = field(init=False, repr=False, default=None)
     _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
     _period: float = field(init=False, repr=False, default=0.1)
     _regulator: Regulator = field(init=False, repr=False)
@@ -83,21 +83,21 @@ class InverseDynamics:
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes."""
-        self._scenarios, self._period, self._lifts = scenarios, control_period, None
+        self._scenarios, self._period, self._hoists = scenarios, control_period, None
         self._rope = RequiredRope(scenarios, control_period)
 
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for observations (N, 14) of the full state."""
-        if self._lifts is None:
-            self._lifts = Lifts(len(observation), self._period, STATE)
-            self._lifts.start([s.crane for s in self._scenarios], observation)
-            self._regulator = self._lifts.regulator(self.gains)
+        if self._hoists is None:
+            self._hoists = HoistBatch(len(observation), self._period, STATE)
+            self._hoists.start([s.crane for s in self._scenarios], observation)
+            self._regulator = self._hoists.regulator(self.gains)
             now = self._rope.now()
             self._rope.advance()
             later = self._rope.now()
             self._required = np.stack([2.0 * now - later, now, later])
-        lifts, winch, period = self._lifts, self._lifts.winch, self._period
-        o = lifts.columns(observation)
+        hoists, winch, period = self._hoists, self._hoists.winch, self._period
+        o = hoists.columns(observation)
         winch.speed = o["drum_speed"]
         before, now, later = self._required
         rope_end = now - winch.radius * o["drum_angle"]

@@ -8,9 +8,9 @@ import numpy as np
 
 from aframe_env.scenario.crane import GRAVITY
 from aframe_env.scenario.sensors import Sensors
-from agents.control.regulator import Columns, Lifts
-from agents.estimation import ALL, DRUM_RADIUS, Estimator, FloatArray, Readings, Rows
-from agents.kalman import RopeFilter, WaveBank, WaveFilter
+from agents.control.filters import ALL, DRUM_RADIUS, Estimator, FloatArray, Readings, Rows
+from agents.control.kalman import RopeFilter, WaveBank, WaveFilter
+from agents.control.regulator import Columns, HoistBatch
 
 
 class Observer(ABC):
@@ -20,17 +20,17 @@ class Observer(ABC):
     the pulleys' motion.
     """
 
-    def __init__(self, lifts: Lifts, damping_ratio: float, delay: float) -> None:
+    def __init__(self, hoists: HoistBatch, damping_ratio: float, delay: float) -> None:
         """``damping_ratio`` of the loads' bobbing, share of critical; ``delay`` in s, rounded to control steps."""
-        self._lifts = lifts
+        self._hoists = hoists
         self._damping_ratio = damping_ratio
-        self.model = lifts.model(damping_ratio)
-        self._turns = np.zeros((round(delay / lifts.period), len(lifts.frequency)))
+        self.model = hoists.model(damping_ratio)
+        self._turns = np.zeros((round(delay / hoists.period), len(hoists.frequency)))
         """(steps of delay, N) how far the drums have turned since the moment that the readings speak of, rad."""
 
     def start(self, o: Columns, rows: Rows = ALL) -> None:
-        """Begin lifts, as ``lifts`` has, in these rows with the first readings (n,)."""
-        self.model.replace(rows, self._lifts.model(self._damping_ratio, rows))
+        """Begin hoists, as ``hoists`` has, in these rows with the first readings (n,)."""
+        self.model.replace(rows, self._hoists.model(self._damping_ratio, rows))
         self._turns[:, rows] = 0.0
         self._start(o, rows)
 
@@ -42,14 +42,14 @@ class Observer(ABC):
 
     def state(self) -> FloatArray:
         """State z (N, 4) of the rope's model, now."""
-        lifts, still = self._lifts, np.zeros(len(self._lifts.frequency))
-        rises = np.diff(self._path(lifts.period * np.arange(len(self._turns) + 1.0)), axis=0)
+        hoists, still = self._hoists, np.zeros(len(self._hoists.frequency))
+        rises = np.diff(self._path(hoists.period * np.arange(len(self._turns) + 1.0)), axis=0)
         depth_error, load_velocity, stretch = self._load()
         z = np.stack([depth_error, load_velocity, depth_error + stretch, still], axis=1)
         for rise, turn in zip(rises, self._turns, strict=True):
             z[:, 3] = 0.0
-            z = self.model.advance(z, (rise - lifts.winch.radius * turn) / lifts.period)
-        z[:, 3] = self.pulley_velocity(1)[0] - lifts.winch.radius * lifts.winch.speed
+            z = self.model.advance(z, (rise - hoists.winch.radius * turn) / hoists.period)
+        z[:, 3] = self.pulley_velocity(1)[0] - hoists.winch.radius * hoists.winch.speed
         return z
 
     def rises(self, steps: int) -> FloatArray:
@@ -62,7 +62,7 @@ class Observer(ABC):
 
     def _times(self, count: int) -> FloatArray:
         """Now and the ends of the coming control steps, s after the moment that the readings speak of."""
-        return self._lifts.period * np.arange(len(self._turns), len(self._turns) + count, dtype=np.float64)
+        return self._hoists.period * np.arange(len(self._turns), len(self._turns) + count, dtype=np.float64)
 
     @abstractmethod
     def _start(self, o: Columns, rows: Rows) -> None:
@@ -91,9 +91,9 @@ class PolynomialObserver(Observer):
     It has no model of the sea: good for a fraction of a wave.
     """
 
-    def __init__(self, lifts: Lifts, damping_ratio: float, delay: float) -> None:
-        super().__init__(lifts, damping_ratio, delay)
-        self._estimator = Estimator(len(lifts.frequency), lifts.period)
+    def __init__(self, hoists: HoistBatch, damping_ratio: float, delay: float) -> None:
+        super().__init__(hoists, damping_ratio, delay)
+        self._estimator = Estimator(len(hoists.frequency), hoists.period)
 
     def _start(self, o: Columns, rows: Rows) -> None:
         self._estimator.start(self._readings(o, rows), rows)
@@ -118,9 +118,9 @@ class PolynomialObserver(Observer):
     def _readings(self, o: Columns, rows: Rows) -> Readings:
         return Readings(
             heave_rate=o["pulley_velocity_z"],
-            drum_angle=o["drum_angle"] * self._lifts.winch.radius[rows] / DRUM_RADIUS,
-            stretch=self._lifts.stretch(o, rows),
-            load_acceleration=self._lifts.load_acceleration(o, rows),
+            drum_angle=o["drum_angle"] * self._hoists.winch.radius[rows] / DRUM_RADIUS,
+            stretch=self._hoists.stretch(o, rows),
+            load_acceleration=self._hoists.load_acceleration(o, rows),
             depth_error=o["depth_error"],
         )
 
@@ -128,31 +128,31 @@ class PolynomialObserver(Observer):
 class KalmanObserver(Observer):
     """Follows the pulley by a bank of waves and the load by its bobbing on the rope, each with a Kalman filter."""
 
-    def __init__(self, lifts: Lifts, damping_ratio: float, sensors: Sensors) -> None:
+    def __init__(self, hoists: HoistBatch, damping_ratio: float, sensors: Sensors) -> None:
         """``sensors``: their delay and noise are counted on."""
-        super().__init__(lifts, damping_ratio, sensors.delay)
-        rows, hold = len(lifts.frequency), max(1, round(sensors.depth_error.period / lifts.period))
+        super().__init__(hoists, damping_ratio, sensors.delay)
+        rows, hold = len(hoists.frequency), max(1, round(sensors.depth_error.period / hoists.period))
         self._tension = sensors.tension
-        self._waves = WaveFilter(rows, lifts.period, hold)
+        self._waves = WaveFilter(rows, hoists.period, hold)
         self._rope = RopeFilter(rows, WaveBank().rate_noise)
         self._heave_rate, self._drum_angle, self._first_angle, self._depth_error = np.zeros((4, rows))
 
     def _start(self, o: Columns, rows: Rows) -> None:
-        lifts, tension = self._lifts, self._tension
+        hoists, tension = self._hoists, self._tension
         noise = np.maximum(tension.noise, tension.relative_noise * o["load_mass"] * GRAVITY)
-        model = lifts.model(self._damping_ratio, rows)
-        self._rope.start(model, lifts.period, lifts.stretch_under(noise, o, rows), rows)
+        model = hoists.model(self._damping_ratio, rows)
+        self._rope.start(model, hoists.period, hoists.stretch_under(noise, o, rows), rows)
         self._waves.start(rows)
         self._heave_rate[rows], self._drum_angle[rows] = o["pulley_velocity_z"], o["drum_angle"]
         self._first_angle[rows], self._depth_error[rows] = o["drum_angle"], 0.0
 
     def _advance(self, o: Columns) -> None:
-        radius, heave_rate, drum_angle = self._lifts.winch.radius, o["pulley_velocity_z"], o["drum_angle"]
+        radius, heave_rate, drum_angle = self._hoists.winch.radius, o["pulley_velocity_z"], o["drum_angle"]
         paid_out = radius * (drum_angle - self._drum_angle)
-        speed = 0.5 * (heave_rate + self._heave_rate) - paid_out / self._lifts.period
+        speed = 0.5 * (heave_rate + self._heave_rate) - paid_out / self._hoists.period
         self._heave_rate, self._drum_angle = heave_rate, drum_angle
         self._waves.advance(heave_rate)
-        self._rope.advance(speed, self._lifts.stretch(o))
+        self._rope.advance(speed, self._hoists.stretch(o))
         below = radius * (drum_angle - self._first_angle) + self._rope.stretch
         self._waves.correct(o["depth_error"] - self._waves.heave() + below)
         self._depth_error = self._waves.heave() - below

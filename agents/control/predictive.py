@@ -19,7 +19,7 @@ from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED
 from aframe_env.validation import InvalidValue, require_integer, require_number
 from agents.control.observer import KalmanObserver
-from agents.control.regulator import Lifts, Observation
+from agents.control.regulator import HoistBatch, Observation
 from agents.control.rope import RopeModel
 from agents.policy import FloatArray, Knowledge
 
@@ -90,7 +90,7 @@ class PredictiveControl:
     knows: Knowledge = field(init=False, default=Knowledge.SENSORS)
     _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
     _period: float = field(init=False, repr=False, default=0.1)
-    _lifts: Lifts | None = field(init=False, repr=False, default=None)
+    _hoists: HoistBatch | None = field(init=False, repr=False, default=None)
     _model: RopeModel = field(init=False, repr=False)
     _k: FloatArray = field(init=False, repr=False)
     _problems: dict[int, Problem] = field(init=False, repr=False)
@@ -104,25 +104,25 @@ class PredictiveControl:
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes; of the scenarios only the crane is looked at."""
-        self._scenarios, self._period, self._lifts = scenarios, control_period, None
+        self._scenarios, self._period, self._hoists = scenarios, control_period, None
 
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for readings (N, 10)."""
-        if self._lifts is None:
-            lifts = self._lifts = Lifts(len(observation), self._period, SENSED)
-            o = lifts.start([s.crane for s in self._scenarios], observation)
-            self._observer = KalmanObserver(lifts, self.damping_ratio, self.sensors)
+        if self._hoists is None:
+            hoists = self._hoists = HoistBatch(len(observation), self._period, SENSED)
+            o = hoists.start([s.crane for s in self._scenarios], observation)
+            self._observer = KalmanObserver(hoists, self.damping_ratio, self.sensors)
             self._observer.start(o)
             self._model = self._observer.model
             self._k = self._model.gains(self.effort)
             self._problems = {}
         else:
-            lifts = self._lifts
-            self._observer.advance(self._turned, lifts.columns(observation))
+            hoists = self._hoists
+            self._observer.advance(self._turned, hoists.columns(observation))
         z, pulley = self._observer.state(), self._observer.rises(self.horizon).T / self._period
-        change = self.first_change(z, pulley, lifts.winch.speed)
+        change = self.first_change(z, pulley, hoists.winch.speed)
         speed = pulley[:, 0] - z[:, 3] - change
-        command, self._turned = lifts.winch.command(self._period * speed / lifts.winch.radius)
+        command, self._turned = hoists.winch.command(self._period * speed / hoists.winch.radius)
         return command
 
     def first_change(self, z: FloatArray, pulley: FloatArray, drum_speed: FloatArray) -> FloatArray:
@@ -144,8 +144,8 @@ class PredictiveControl:
 
     def _limits(self, z: FloatArray, pulley: FloatArray, drum_speed: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Bounds (N, 2 H) on the changes and on the speeds that they add up to."""
-        assert self._lifts is not None
-        winch = self._lifts.winch
+        assert self._hoists is not None
+        winch = self._hoists.winch
         # The drum's mean speed in a control step is the pulley's less the rope end's. From its speed now it can
         # come by half of what it can gain in a whole step, and from step to step by all of it.
         gain = (self._period * winch.radius * winch.max_acceleration)[:, None]

@@ -1,4 +1,4 @@
-"""The feedback law that the control policies share, and what it needs to know of the lifts at hand."""
+"""The feedback law that the control policies share, and what it needs to know of the hoists at hand."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy.typing as npt
 from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.task import Quantity
 from aframe_env.validation import InvalidValue, require_number
+from agents.control.filters import ALL, FloatArray, Rows
 from agents.control.rope import RopeModel
 from agents.control.winch import WinchModel
-from agents.estimation import ALL, FloatArray, Rows
 
 Observation = npt.NDArray[np.float32]
 Columns = dict[str, FloatArray]
@@ -63,7 +63,7 @@ class Regulator:
         return np.asarray(p + (kv + kp) * (np.clip(wanted, -braking, braking) - p))
 
 
-class Lifts:
+class HoistBatch:
     """Winches, loads and ropes of N rows, as far as a policy may know them: the crane, and what it observes."""
 
     def __init__(self, rows: int, control_period: float, quantities: tuple[Quantity, ...]) -> None:
@@ -74,7 +74,7 @@ class Lifts:
         """``frequency``: of the loads' bobbing on their ropes, (N,) rad/s."""
 
     def start(self, cranes: Sequence[Crane], observation: Observation, rows: Rows = ALL) -> Columns:
-        """Begin lifts with these cranes in these rows; return the first observation (n, K) by its quantities' names."""
+        """Begin hoists with these cranes in these rows; return the first observation (n, K) by its names."""
         self.winch.start(cranes, rows)
         o = self.columns(observation)
         self._axial_stiffness[rows] = [crane.rope.axial_stiffness for crane in cranes]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
 
-from agents.estimation import FloatArray, Rows
+from agents.control.filters import FloatArray, Rows
 
 
 @dataclass(frozen=True)

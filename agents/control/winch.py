@@ -12,7 +12,7 @@ import numpy as np
 from aframe_env.dynamics.compiling import kernel, scalar
 from aframe_env.dynamics.winch import drum_state, plan
 from aframe_env.scenario.crane import Crane
-from agents.estimation import ALL, FloatArray, Rows
+from agents.control.filters import ALL, FloatArray, Rows
 
 _BISECTIONS = 48  # a hair of the speed range: below 1e-13 rad/s
 
@@ -28,7 +28,7 @@ class WinchModel:
         """(N,) rad/s, reckoned from the commands since the start; a lift begins with the drum at rest."""
 
     def start(self, cranes: Sequence[Crane], rows: Rows = ALL) -> None:
-        """Begin lifts with these cranes in these rows."""
+        """Begin hoists with these cranes in these rows."""
         winches = [crane.winch for crane in cranes]
         self.radius[rows] = [w.drum_radius for w in winches]
         self.max_speed[rows] = [w.max_speed for w in winches]
@@ -41,10 +41,10 @@ class WinchModel:
 
         The reckoned speed is carried to the end of the control step.
         """
-        command = self.find(turn)
+        command = self.invert(turn)
         return command, self.turn(command)
 
-    def find(self, turn: FloatArray) -> FloatArray:
+    def invert(self, turn: FloatArray) -> FloatArray:
         """Commands (N,) rad/s that would turn the drums by ``turn`` (N,) rad, or as near as may be."""
         command = np.empty_like(turn)
         _kernels().invert(self.speed, self.max_speed, self.max_acceleration, self._lag, self._period, turn, command)

@@ -14,9 +14,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from agents.drives import spline_matrices
-from agents.objectives import Objective, coarse_step
-from agents.optimisation import required_angle
+from agents.drives.functions import spline_matrices
+from agents.drives.objectives import Objective, coarse_step
+from agents.drives.optimisation import required_angle
 from benchmarks.peers.serve import Measurement, serve, speed
 from train.drives import paper_case
 

@@ -7,7 +7,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from aframe_env import ScenarioDistribution
 from aframe_env.env import AFrameHeaveEnv
-from agents.features import STATE_FEATURES, features_for
+from agents.learned.features import STATE_FEATURES, features_for
 from train import ppo, sac
 from train.bridge import TrainingVecEnv
 

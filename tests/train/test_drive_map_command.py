@@ -9,8 +9,8 @@ import time
 import numpy as np
 import pytest
 
-from agents import drive_map as stored
-from agents.drive_map import ideal_ratio
+from agents.drives import map as stored
+from agents.drives.map import ideal_ratio
 from train import drive_map
 
 GRID = {"--amplitudes": (0.5, 3.0), "--periods": (6.0, 9.0, 14.0), "--masses": (2e4, 9e4), "--lengths": (60.0, 900.0)}

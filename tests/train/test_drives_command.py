@@ -8,7 +8,7 @@ import pytest
 
 from aframe_env import Scenario
 from aframe_env.scenario.file import read_scenario, scenario_text
-from agents.drives import HarmonicDrive, SplineDrive
+from agents.drives.functions import HarmonicDrive, SplineDrive
 from train import drives
 
 KEYS = ["drive", "objective", "omega1", "omega2", "rms", "amplitude", "evaluations", "seconds"]

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from agents.tuned_drives import TUNED
+from agents.drives.tuned import TUNED
 from train import evaluate
 
 RESULTS = Path(__file__).parents[2] / "results"

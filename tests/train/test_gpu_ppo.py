@@ -15,8 +15,8 @@ pytest.importorskip("rsl_rl", reason='rsl-rl-lib is not installed (extra "cuda")
 
 from aframe_env import ScenarioDistribution
 from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
-from agents.learned import load
-from agents.tensor_features import TensorStateFeatures
+from agents.learned.agent import load
+from agents.learned.tensor_features import TensorStateFeatures
 from train import gpu_ppo, ppo
 from train.gpu_ppo import Options
 from train.tensor_bridge import TrainingRows

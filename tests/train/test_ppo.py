@@ -3,7 +3,7 @@ import tomllib
 
 import pytest
 
-from agents.learned import load
+from agents.learned.agent import load
 from train import ppo
 from train.held_out import AFTER_TRAINING
 

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from aframe_env.scenario import ScenarioDistribution
-from agents.catalogue import Choice, choose
 from agents.policy import Knowledge
+from agents.registry import PolicySpec, choose
 from agents.rollout import Episodes, held_out_scenarios
 from train.comparison import Entry, Interval
 from train.held_out import CONTROL_PERIOD, Comparison, HeldOut, run_all
@@ -269,7 +269,7 @@ def test_per_cent_has_more_digits_near_all():
 @pytest.fixture(scope="module")
 def comparison():
     """Eight scenarios: the drum still, a feedback law, and inverse dynamics, which ran in the first three."""
-    floor = Choice("inverse <dynamics>", choose("inverse dynamics").build, for_each_scenario=True)
+    floor = PolicySpec("inverse <dynamics>", choose("inverse dynamics").build, for_each_scenario=True)
     return run_all(
         [choose("feed-forward + feedback (state)"), floor],
         HeldOut(scenarios=8, privileged=3),

@@ -7,8 +7,8 @@ import pytest
 
 from aframe_env import Harmonic, HarmonicMotion, Scenario, ScenarioDistribution
 from aframe_env.task import SENSED, STATE
-from agents.drive_policy import Follower
-from agents.drives import RampedDrive
+from agents.drives.functions import RampedDrive
+from agents.drives.policy import Follower
 from agents.policy import DrumStill, Knowledge
 from agents.rollout import held_out_scenarios, run
 from train import sensitivity

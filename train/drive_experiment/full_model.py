@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from aframe_env.rfem.simulate import Drum, DynamicCase, PrescribedDrum, StillDrum, simulate
 from aframe_env.scenario import Scenario
-from agents.drives import Drive
+from agents.drives.functions import Drive
 from agents.policy import FloatArray
 from train.drive_experiment.results import Result, Transfer
 

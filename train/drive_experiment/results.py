@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from agents.drives import Drive
+from agents.drives.functions import Drive
 from agents.policy import FloatArray
 from train.output import write_json, write_text
 

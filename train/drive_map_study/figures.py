@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from agents.drive_map import DriveMap
+from agents.drives.map import DriveMap
 from train.comparison import reductions
 from train.drive_map_study.held_out import HeldOut
 from train.drive_map_study.notes import closed_form

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from agents.drive_map import DriveMap, Node, NodeDrive, optimise_node
-from agents.drives import RampedDrive
-from agents.objectives import Objective, coarse_step
+from agents.drives.functions import RampedDrive
+from agents.drives.map import DriveMap, Node, NodeDrive, optimise_node
+from agents.drives.objectives import Objective, coarse_step
 
 
 @dataclass(frozen=True)

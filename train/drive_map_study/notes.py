@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from agents.drive_map import DriveMap, Node, NodeDrive, ideal_ratio
+from agents.drives.map import DriveMap, Node, NodeDrive, ideal_ratio
 from agents.policy import FloatArray
 from train.comparison import HEADINGS, cells, markdown_table
 from train.drive_map_study.held_out import HeldOut
@@ -43,7 +43,7 @@ what the map itself is worth, as far as superposition holds. The last column kno
 Where even a drive that knows the future falls short, the sea asks more of the winch than it has (Hs above 3 m), or
 there is next to nothing to remove (a regular wave shorter than 3 s moves the tip by millimetres). With every wave known
 the map is behind a fresh optimisation by what is not linear in the waves: the tip also sinks with the squares of the
-ship's roll and pitch, and the load's swing lifts it. Where the ship only heaves the difference goes.
+ship's roll and pitch, and the load's swing hoists it. Where the ship only heaves the difference goes.
 
 So the map is right, and what fails in a random sea is the forecast: phases measured at the start are worth about one
 wave there, and a drive that runs by the clock for a minute is soon out of step. Measuring notices this (it takes from

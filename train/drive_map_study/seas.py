@@ -11,9 +11,9 @@ from typing import Final
 from rich.progress import Progress
 
 from aframe_env.scenario import ScenarioDistribution
-from agents.drive_map import DriveMap
-from agents.drive_map_policy import DriveMapPolicy
-from agents.drive_policy import DrivePolicy
+from agents.drives.map import DriveMap
+from agents.drives.map_policy import DriveMapPolicy
+from agents.drives.policy import DrivePolicy
 from agents.policy import DrumStill, Knowledge, Policy
 from agents.rollout import held_out_scenarios, run
 from train.comparison import Entry, Row, compare, write_comparison

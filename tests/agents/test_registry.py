@@ -6,11 +6,11 @@ import torch
 
 from aframe_env import InvalidValue, ScenarioDistribution
 from agents import load
-from agents.catalogue import CATALOGUE, Setting, choose, choose_all, slug
-from agents.features import STATE_FEATURES
-from agents.learned import CARD, WEIGHTS, AgentCard, card_text, digest, serialise
-from agents.network import Actor
+from agents.learned.agent import CARD, WEIGHTS, AgentCard, card_text, digest, serialise
+from agents.learned.features import STATE_FEATURES
+from agents.learned.network import Actor
 from agents.policy import Knowledge
+from agents.registry import REGISTRY, BuildContext, choose, choose_all, slug
 from agents.rollout import held_out_scenarios
 
 
@@ -34,9 +34,9 @@ def write_agent(folder, seed):
     (folder / CARD).write_text(card_text(card))
 
 
-def setting(count=2):
+def context(count=2):
     distribution = ScenarioDistribution()
-    return Setting(
+    return BuildContext(
         scenarios=held_out_scenarios(distribution, count),
         nominal=distribution.nominal(),
         episode_duration=10.0,
@@ -49,7 +49,7 @@ def test_a_folder_of_seeds_is_all_of_its_agents(tmp_path):
         write_agent(tmp_path / "ppo" / f"seed-{seed}", seed)
     choices = choose_all([str(tmp_path / "ppo"), "drum-still"])
     assert [choice.name for choice in choices] == ["PPO, seed 0", "PPO, seed 2", "PPO, seed 10", "drum still"]
-    built = [choice.build(setting()) for choice in choices[:3]]
+    built = [choice.build(context()) for choice in choices[:3]]
     assert [policy.card.seed for policy in built] == [0, 2, 10]
     assert load(tmp_path / "ppo").card.seed == 0
 
@@ -62,7 +62,7 @@ def test_agents_of_one_name_and_seed_are_told_apart_by_their_folders(tmp_path):
     assert names == [f"PPO, seed 1, {folder}" for folder in folders]
 
 
-@pytest.mark.parametrize("name", CATALOGUE)
+@pytest.mark.parametrize("name", REGISTRY)
 def test_every_name_can_be_typed_and_chosen(name):
     typed = slug(name)
     assert typed.isascii()
@@ -73,7 +73,7 @@ def test_every_name_can_be_typed_and_chosen(name):
     "name", ["feed-forward + feedback (state)", "feed-forward + feedback", "inverse dynamics", "predictive control"]
 )
 def test_the_laws_are_there_with_what_they_know(name):
-    policy = choose(name).build(setting())
+    policy = choose(name).build(context())
     assert policy.name == name
     assert policy.knows in (Knowledge.STATE, Knowledge.SENSORS, Knowledge.FUTURE)
 
@@ -87,15 +87,15 @@ def late_push(observation, time):
 
 
 def test_anybodys_function_is_a_policy():
-    policy = choose(f"{__name__}:push").build(setting())
-    policy.reset(setting().scenarios, 0.1)
+    policy = choose(f"{__name__}:push").build(context())
+    policy.reset(context().scenarios, 0.1)
     np.testing.assert_array_equal(policy.act(np.ones((2, 14), dtype=np.float32), 0.0), [0.5, 0.5])
-    policy = choose(f"{__name__}:late_push").build(setting())
-    policy.reset(setting().scenarios, 0.1)
+    policy = choose(f"{__name__}:late_push").build(context())
+    policy.reset(context().scenarios, 0.1)
     np.testing.assert_array_equal(policy.act(np.ones((2, 14), dtype=np.float32), 3.0), [3.0, 3.0])
 
 
-@pytest.mark.parametrize("text", ["absent", "json:absent", f"{__name__}:CATALOGUE"])
+@pytest.mark.parametrize("text", ["absent", "json:absent", f"{__name__}:REGISTRY"])
 def test_what_is_no_policy_is_refused(text):
     with pytest.raises(InvalidValue, match="policy = "):
         choose(text)

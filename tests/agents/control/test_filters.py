@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from agents.estimation import FadingPolynomial
+from agents.control.filters import FadingPolynomial
 
 ALL = slice(None)
 

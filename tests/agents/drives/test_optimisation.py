@@ -3,9 +3,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from aframe_env import Harmonic, HarmonicMotion, InvalidValue, Scenario, ScenarioDistribution
-from agents.drives import spline_matrices
-from agents.objectives import Objective, coarse_step
-from agents.optimisation import optimise, required_angle
+from agents.drives.functions import spline_matrices
+from agents.drives.objectives import Objective, coarse_step
+from agents.drives.optimisation import optimise, required_angle
 
 
 def paper(damping=1.5e4):

@@ -4,7 +4,7 @@ import pytest
 from aframe_env import Crane, HarmonicMotion, Scenario, ScenarioDistribution
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.simulation import Simulation
-from agents.features import AUTHORITY, LIMIT, SENSED_FEATURES, STATE_FEATURES, features_for
+from agents.learned.features import AUTHORITY, LIMIT, SENSED_FEATURES, STATE_FEATURES, features_for
 
 PERIOD = 0.1
 

@@ -10,7 +10,7 @@ import torch
 from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.task import STATE
 from agents.control.winch import WinchModel
-from agents.features import LIMIT, STATE_FEATURES, coming_rise, of_the_state, wanted_turn
+from agents.learned.features import LIMIT, STATE_FEATURES, coming_rise, of_the_state, wanted_turn
 
 _Find = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 """(wanted turns, drum speeds), both (N,) float64 → commands (N,)."""
@@ -74,4 +74,4 @@ class _OnTheProcessor:
             self._winches = WinchModel(len(turn), self._period)
             self._winches.start([self._crane] * len(turn))
         self._winches.speed[:] = speed.numpy()
-        return torch.from_numpy(self._winches.find(turn.numpy()))
+        return torch.from_numpy(self._winches.invert(turn.numpy()))

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import PPoly
 
 from aframe_env import InvalidValue
-from agents.drives import (
+from agents.drives.functions import (
     Drive,
     HarmonicDrive,
     SplineDrive,

@@ -8,8 +8,8 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from aframe_env import InvalidValue, RecordedMotion, Scenario, ScenarioDistribution
-from agents.drives import HarmonicDrive, SplineDrive
-from agents.objectives import Objective, coarse_step
+from agents.drives.functions import HarmonicDrive, SplineDrive
+from agents.drives.objectives import Objective, coarse_step
 
 
 def oracle(scenario, drive, duration):

@@ -18,9 +18,9 @@ from aframe_env.scenario.crane import Crane
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE, Quantity
 from aframe_env.validation import InvalidValue
+from agents.control.filters import ALL, HEAVE_MEMORY, FadingPolynomial, FloatArray, Rows
 from agents.control.observer import KalmanObserver
-from agents.control.regulator import Columns, Lifts, Observation
-from agents.estimation import ALL, HEAVE_MEMORY, FadingPolynomial, FloatArray, Rows
+from agents.control.regulator import Columns, HoistBatch, Observation
 
 Float32Array = npt.NDArray[np.float32]
 
@@ -66,27 +66,29 @@ class StateFeatures:
     names = STATE_FEATURES
 
     def __init__(self, rows: int, control_period: float) -> None:
-        self._lifts = Lifts(rows, control_period, STATE)
+        self._hoists = HoistBatch(rows, control_period, STATE)
         self._rise = np.zeros(rows)
         """Of the pulley during the coming control step, (N,) m."""
 
     def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
-        """Features (n, F) of the first observations (n, K) of these ``rows``, lifts with these ``cranes`` (n)."""
-        return self._look(self._lifts.start(cranes, observation, rows), rows)
+        """Features (n, F) of the first observations (n, K) of these ``rows``, hoists with these ``cranes`` (n)."""
+        return self._look(self._hoists.start(cranes, observation, rows), rows)
 
     def advance(self, observation: Observation) -> Float32Array:
         """Features (N, F) of all rows, whose observations (N, K) are one control step later."""
-        return self._look(self._lifts.columns(observation), ALL)
+        return self._look(self._hoists.columns(observation), ALL)
 
     def command(self, output: FloatArray) -> FloatArray:
         """Drum speed commands (N,) rad/s for a network's output (N,), in [-1, 1]."""
-        return self._lifts.winch.find(_turn(self._rise, output, self._lifts))
+        return self._hoists.winch.invert(_turn(self._rise, output, self._hoists))
 
     def _look(self, o: Columns, rows: Rows) -> Float32Array:
-        lifts = self._lifts
-        lifts.winch.speed[rows] = o["drum_speed"]
-        self._rise[rows] = coming_rise(o, lifts.period)
-        return _stacked(*of_the_state(np, o, lifts.winch.radius[rows], lifts.stretch(o, rows), lifts.frequency[rows]))
+        hoists = self._hoists
+        hoists.winch.speed[rows] = o["drum_speed"]
+        self._rise[rows] = coming_rise(o, hoists.period)
+        return _stacked(
+            *of_the_state(np, o, hoists.winch.radius[rows], hoists.stretch(o, rows), hoists.frequency[rows])
+        )
 
 
 class SensedFeatures:
@@ -95,8 +97,8 @@ class SensedFeatures:
     names = SENSED_FEATURES
 
     def __init__(self, rows: int, control_period: float, sensors: Sensors) -> None:
-        self._lifts = Lifts(rows, control_period, SENSED)
-        self._observer = KalmanObserver(self._lifts, _DAMPING_RATIO, sensors)
+        self._hoists = HoistBatch(rows, control_period, SENSED)
+        self._observer = KalmanObserver(self._hoists, _DAMPING_RATIO, sensors)
         self._pulley = FadingPolynomial(rows, HEAVE_MEMORY, control_period)
         self._ahead = control_period * round(sensors.delay / control_period) + 0.5 * control_period
         """From the moment that the readings speak of to the middle of the coming control step, s."""
@@ -107,29 +109,29 @@ class SensedFeatures:
 
     def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
         """Features (n, F) of the first observations (n, K) of these ``rows``, whose past is forgotten."""
-        o = self._lifts.start(cranes, observation, rows)
+        o = self._hoists.start(cranes, observation, rows)
         self._observer.start(o, rows)
         self._pulley.start(o["pulley_velocity_z"], rows)
         return self._look(o, rows)
 
     def advance(self, observation: Observation) -> Float32Array:
         """Features (N, F) of all rows, whose observations (N, K) are one control step later."""
-        o = self._lifts.columns(observation)
+        o = self._hoists.columns(observation)
         self._observer.advance(self._turned, o)
         self._pulley.advance(o["pulley_velocity_z"])
         return self._look(o, ALL)
 
     def command(self, output: FloatArray) -> FloatArray:
         """Drum speed commands (N,) rad/s for a network's output (N,), in [-1, 1]."""
-        command, self._turned = self._lifts.winch.command(_turn(self._rise, output, self._lifts))
+        command, self._turned = self._hoists.winch.command(_turn(self._rise, output, self._hoists))
         return command
 
     def _look(self, o: Columns, rows: Rows) -> Float32Array:
-        lifts = self._lifts
+        hoists = self._hoists
         depth_error, load_velocity, rope_end, rope_end_speed = self._observer.state()[rows].T
         self._rise[rows] = self._observer.rises(1)[0, rows]
         velocity = self._observer.pulley_velocity(3)[:, rows]
-        soon, later = np.diff(velocity, axis=0) / lifts.period
+        soon, later = np.diff(velocity, axis=0) / hoists.period
         return _stacked(
             *_of_the_load(np, depth_error, load_velocity, rope_end - depth_error),
             10.0 * rope_end_speed,
@@ -137,7 +139,7 @@ class SensedFeatures:
             self._pulley.rate(rows) + self._ahead * self._pulley.bend(rows),
             soon,
             later,
-            *_of_the_lift(o, lifts.frequency[rows]),
+            *_of_the_lift(o, hoists.frequency[rows]),
         )
 
 
@@ -149,9 +151,9 @@ def features_for(rows: int, control_period: float, sensors: Sensors | None) -> F
     return SensedFeatures(rows, control_period, sensors) if sensors else StateFeatures(rows, control_period)
 
 
-def _turn(rise: FloatArray, output: FloatArray, lifts: Lifts) -> FloatArray:
-    winch = lifts.winch
-    return np.asarray(wanted_turn(np, rise, output, winch.radius, winch.max_acceleration, lifts.period))
+def _turn(rise: FloatArray, output: FloatArray, hoists: HoistBatch) -> FloatArray:
+    winch = hoists.winch
+    return np.asarray(wanted_turn(np, rise, output, winch.radius, winch.max_acceleration, hoists.period))
 
 
 # For arrays of numpy (``xp`` = numpy) and tensors of torch (``xp`` = torch) alike, all (N,).

@@ -3,10 +3,10 @@ import pytest
 
 from aframe_env import InvalidValue, ScenarioDistribution
 from aframe_env.env import AFrameHeaveEnv
-from agents.drive_policy import DrivePolicy
-from agents.drives import SplineDrive
-from agents.objectives import Objective
-from agents.optimisation import OptimisedDrive, optimise
+from agents.drives.functions import SplineDrive
+from agents.drives.objectives import Objective
+from agents.drives.optimisation import OptimisedDrive, optimise
+from agents.drives.policy import DrivePolicy
 from agents.policy import DrumStill
 from agents.rollout import held_out_scenarios, run
 

@@ -8,9 +8,9 @@ from aframe_env import InvalidValue, ScenarioDistribution
 from aframe_env.env import AFrameHeaveEnv
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
-from agents.features import feature_names
-from agents.learned import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, load, serialise
-from agents.network import Actor
+from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, load, serialise
+from agents.learned.features import feature_names
+from agents.learned.network import Actor
 from agents.policy import Knowledge
 from agents.rollout import held_out_scenarios, run
 

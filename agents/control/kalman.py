@@ -15,8 +15,8 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from agents.control.filters import ALL, FloatArray, Rows
 from agents.control.rope import RopeModel
-from agents.estimation import ALL, FloatArray, Rows
 
 ComplexArray = npt.NDArray[np.complex128]
 
@@ -126,12 +126,12 @@ class WaveFilter:
         """Take a reading (N,) m/s of the pulley's heave rate, a control step later."""
         self._step += 1
         self._state *= self._turn
-        miss = heave_rate - self._state[:, :-1].real.sum(axis=1)
-        self._state += miss[:, None] * self._schedule.rate[self._schedule.index(self._step)]
+        innovation = heave_rate - self._state[:, :-1].real.sum(axis=1)
+        self._state += innovation[:, None] * self._schedule.rate[self._schedule.index(self._step)]
 
-    def correct(self, miss: FloatArray) -> None:
+    def correct(self, innovation: FloatArray) -> None:
         """Take what a reading of the depth misses (N,) m, heeded in the steps that have one."""
-        self._state += miss[:, None] * self._schedule.depth[self._schedule.index(self._step)]
+        self._state += innovation[:, None] * self._schedule.depth[self._schedule.index(self._step)]
 
     def heave(self) -> FloatArray:
         """Rise (N,) m of the pulley since the start, and the offset."""
@@ -164,7 +164,7 @@ class RopeFilter:
         """``rate_noise`` of a reading of the heave rate, m/s."""
         self._rate_noise = rate_noise
         self._a, self._b = np.zeros((rows, 3, 3)), np.zeros((rows, 3))
-        self._stir, self._covariance = np.zeros((rows, 3, 3)), np.zeros((rows, 3, 3))
+        self._process_noise, self._covariance = np.zeros((rows, 3, 3)), np.zeros((rows, 3, 3))
         self._noise = np.ones(rows)
         self._x = np.zeros((rows, 3))
 
@@ -172,9 +172,9 @@ class RopeFilter:
         """Begin in these rows with loads at rest; ``stretch_noise`` (n,) of a reading of the stretch, m."""
         self._a[rows], self._b[rows] = model.a[:, :3, :3], model.b[:, :3]
         b = model.b[:, :3]
-        stir = self._rate_noise**2 * b[:, :, None] * b[:, None, :]
-        stir[:, 1, 1] += (ACCELERATION_NOISE * period) ** 2
-        self._stir[rows] = stir
+        process_noise = self._rate_noise**2 * b[:, :, None] * b[:, None, :]
+        process_noise[:, 1, 1] += (ACCELERATION_NOISE * period) ** 2
+        self._process_noise[rows] = process_noise
         self._covariance[rows] = 1e-4 * np.eye(3)
         self._noise[rows] = stretch_noise**2
         self._x[rows] = 0.0
@@ -183,7 +183,7 @@ class RopeFilter:
         """Take the mean speed (N,) m/s of the rope's end over a control step, and the stretch (N,) m at its end."""
         a = self._a
         x = (a @ self._x[:, :, None])[:, :, 0] + self._b * speed[:, None]
-        p = a @ self._covariance @ a.transpose(0, 2, 1) + self._stir
+        p = a @ self._covariance @ a.transpose(0, 2, 1) + self._process_noise
         seen = p[:, :, 2] - p[:, :, 0]
         gain = seen / (seen[:, 2] - seen[:, 0] + self._noise)[:, None]
         self._x = x + gain * (stretch - (x[:, 2] - x[:, 0]))[:, None]

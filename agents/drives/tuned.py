@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from aframe_env.scenario import Scenario
-from agents.optimisation import Family, ObjectiveName, OptimisedDrive, Optimiser, optimise
+from agents.drives.optimisation import Family, ObjectiveName, OptimisedDrive, Optimiser, optimise
 
 
 @dataclass(frozen=True)

@@ -80,9 +80,9 @@ class FadingPolynomial:
         """Take the signal (N,) a control step later."""
         value, slope, bend = self._terms
         value, slope = value + slope + bend, slope + 2.0 * bend
-        miss = signal - value
+        innovation = signal - value
         a, b, c = self._gains
-        self._terms = np.stack([value + a * miss, slope + b * miss, bend + c * miss])
+        self._terms = np.stack([value + a * innovation, slope + b * innovation, bend + c * innovation])
 
     def value(self, rows: Rows) -> FloatArray:
         """The signal, smoothed."""
@@ -130,9 +130,9 @@ class Estimator:
         self._rope_end -= DRUM_RADIUS * (readings.drum_angle - self._last_drum_angle)
         self._position += dt * (self._velocity + 0.5 * dt * readings.load_acceleration)
         self._velocity += dt * readings.load_acceleration
-        miss = self._rope_end - readings.stretch - self._position
-        self._position += LOAD_GAINS[0] * miss
-        self._velocity += LOAD_GAINS[1] * miss
+        innovation = self._rope_end - readings.stretch - self._position
+        self._position += LOAD_GAINS[0] * innovation
+        self._velocity += LOAD_GAINS[1] * innovation
         # The depth sensor holds its reading between samples: one that has not changed says nothing new.
         fresh = readings.depth_error != self._last_depth
         correction = np.where(fresh, DEPTH_GAIN * (readings.depth_error - self._position), 0.0)

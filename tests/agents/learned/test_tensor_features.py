@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from aframe_env import Crane, Rope, Winch
 from aframe_env.task import STATE
-from agents.features import StateFeatures
-from agents.tensor_features import TensorStateFeatures
+from agents.learned.features import StateFeatures
+from agents.learned.tensor_features import TensorStateFeatures
 
 RANGES = {
     "depth_error": (-30.0, 30.0),

@@ -11,7 +11,7 @@ from agents.control.inverse_dynamics import InverseDynamics, RequiredRope
 from agents.control.regulator import Gains
 from agents.control.rope import RopeModel
 from agents.control.winch import WinchModel
-from agents.objectives import Objective
+from agents.drives.objectives import Objective
 from agents.policy import DrumStill
 from agents.rollout import held_out_scenarios, run
 

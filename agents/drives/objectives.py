@@ -24,7 +24,7 @@ from aframe_env.engine import Engine
 from aframe_env.scenario import Scenario
 from aframe_env.scenario.motion import require_coverage
 from aframe_env.validation import require_number
-from agents.drives import Drive
+from agents.drives.functions import Drive
 
 FloatArray = npt.NDArray[np.float64]
 

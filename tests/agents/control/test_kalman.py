@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
+from agents.control.kalman import ACCELERATION_NOISE, RopeFilter, WaveBank, WaveFilter
 from agents.control.rope import RopeModel
-from agents.kalman import ACCELERATION_NOISE, RopeFilter, WaveBank, WaveFilter
 
 PERIOD = 0.1
 
@@ -73,8 +73,8 @@ def test_the_rope_filter_is_the_conditional_mean():
     see = np.array([[-1.0, 0.0, 1.0]])
     for i in range(2):
         a, b = model.a[i, :3, :3], model.b[i, :3]
-        stir = rate_noise**2 * np.outer(b, b) + np.diag([0.0, (ACCELERATION_NOISE * PERIOD) ** 2, 0.0])
-        arguments = ([stir] * steps, [see] * steps, stretch[:, i : i + 1], [noise[i : i + 1]] * steps)
+        process_noise = rate_noise**2 * np.outer(b, b) + np.diag([0.0, (ACCELERATION_NOISE * PERIOD) ** 2, 0.0])
+        arguments = ([process_noise] * steps, [see] * steps, stretch[:, i : i + 1], [noise[i : i + 1]] * steps)
         want = conditioned(a, 1e-4 * np.eye(3), *arguments)
         assert rope.load_velocity[i] == pytest.approx(want[1], rel=1e-6)
         assert rope.stretch[i] == pytest.approx(want[2] - want[0], rel=1e-6)

@@ -26,10 +26,10 @@ from aframe_env.scenario import Scenario
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion
 from aframe_env.serialization import strict_converter, structure
 from aframe_env.validation import InvalidValue, require_number
-from agents.drives import RampedDrive
-from agents.heave import Harmonics
-from agents.objectives import Objective, coarse_step
-from agents.optimisation import optimise
+from agents.drives.forecast import Harmonics
+from agents.drives.functions import RampedDrive
+from agents.drives.objectives import Objective, coarse_step
+from agents.drives.optimisation import optimise
 from agents.policy import FloatArray
 
 FORMAT: Final = 1

@@ -1,6 +1,6 @@
 """Policies by name, by folder, or as anybody's ``module:function``: what the comparison can be asked for.
 
-A new kind of policy joins by one entry in ``CATALOGUE``, one that lives in a folder by one entry in ``FOLDERS``.
+A new kind of policy joins by one entry in ``REGISTRY``, one that lives in a folder by one entry in ``FOLDERS``.
 """
 
 from __future__ import annotations
@@ -20,15 +20,16 @@ import numpy.typing as npt
 from aframe_env import task
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue
-from agents import drive_map, learned
 from agents.control.feedback import SensorFeedback, StateFeedback
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.predictive import PredictiveControl
-from agents.drive_map_policy import DriveMapPolicy
-from agents.drive_policy import DrivePolicy
-from agents.optimisation import OptimisedDrive
+from agents.drives import map as drive_map
+from agents.drives.map_policy import DriveMapPolicy
+from agents.drives.optimisation import OptimisedDrive
+from agents.drives.policy import DrivePolicy
+from agents.drives.tuned import TUNED, Tuned, optimised
+from agents.learned import agent as learned
 from agents.policy import DrumStill, FloatArray, Knowledge, Policy
-from agents.tuned_drives import TUNED, Tuned, optimised
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -48,7 +49,7 @@ def in_turn(function: Callable[[Item], Result], items: Sequence[Item]) -> list[R
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setting:
+class BuildContext:
     """What a policy is built for."""
 
     scenarios: Sequence[Scenario]
@@ -63,47 +64,47 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Choice:
+class PolicySpec:
     """A policy to compare: its name, and how it is built."""
 
     name: str
-    build: Callable[[Setting], Policy]
+    build: Callable[[BuildContext], Policy]
     for_each_scenario: bool = False
     """Whether building it takes an optimisation for each scenario: it then runs in the first few of them only."""
 
 
-def _drum_still(setting: Setting) -> Policy:
+def _drum_still(context: BuildContext) -> Policy:
     return DrumStill()
 
 
-def _optimised(setting: Setting, scenarios: Sequence[Scenario], tuned: Tuned) -> list[OptimisedDrive]:
-    return setting.spread(partial(optimised, tuned, setting.episode_duration), scenarios)
+def _optimised(context: BuildContext, scenarios: Sequence[Scenario], tuned: Tuned) -> list[OptimisedDrive]:
+    return context.spread(partial(optimised, tuned, context.episode_duration), scenarios)
 
 
-def _nominal_drive(name: str, tuned: Tuned) -> Choice:
-    def build(setting: Setting) -> Policy:
-        drives = _optimised(setting, [setting.nominal], tuned)
-        return DrivePolicy(name=name, drives=drives * len(setting.scenarios))
+def _nominal_drive(name: str, tuned: Tuned) -> PolicySpec:
+    def build(context: BuildContext) -> Policy:
+        drives = _optimised(context, [context.nominal], tuned)
+        return DrivePolicy(name=name, drives=drives * len(context.scenarios))
 
-    return Choice(name, build)
+    return PolicySpec(name, build)
 
 
-def _drive_for_each(name: str, tuned: Tuned) -> Choice:
-    def build(setting: Setting) -> Policy:
-        drives = _optimised(setting, setting.scenarios, tuned)
+def _drive_for_each(name: str, tuned: Tuned) -> PolicySpec:
+    def build(context: BuildContext) -> Policy:
+        drives = _optimised(context, context.scenarios, tuned)
         return DrivePolicy(name=name, drives=drives, knows=Knowledge.FUTURE)
 
-    return Choice(name, build, for_each_scenario=True)
+    return PolicySpec(name, build, for_each_scenario=True)
 
 
-def _law(make: Callable[[], Policy]) -> Choice:
-    return Choice(make().name, lambda setting: make())
+def _law(make: Callable[[], Policy]) -> PolicySpec:
+    return PolicySpec(make().name, lambda context: make())
 
 
-DRUM_STILL: Final = Choice("drum still", _drum_still)
-CATALOGUE: Final[dict[str, Choice]] = {
-    choice.name: choice
-    for choice in (
+DRUM_STILL: Final = PolicySpec("drum still", _drum_still)
+REGISTRY: Final[dict[str, PolicySpec]] = {
+    spec.name: spec
+    for spec in (
         DRUM_STILL,
         *(_nominal_drive(name, how) for name, how in TUNED.items()),
         *(_law(make) for make in (StateFeedback, SensorFeedback, PredictiveControl, InverseDynamics)),
@@ -124,45 +125,45 @@ def slug(name: str) -> str:
     return name.strip().lower().replace("ω", "omega").replace(" ", "-")
 
 
-def choose(text: str) -> Choice:
+def choose(text: str) -> PolicySpec:
     """A policy from its name in the catalogue (or the name's slug), its folder, or ``module:function``."""
-    by_slug = {slug(name): choice for name, choice in CATALOGUE.items()}
+    by_slug = {slug(name): spec for name, spec in REGISTRY.items()}
     if slug(text) in by_slug:
         return by_slug[slug(text)]
     if Path(text).is_dir():
-        return as_choice(_from_folder(Path(text)))
+        return as_spec(_from_folder(Path(text)))
     module, colon, attribute = text.partition(":")
     if colon and module.replace(".", "").isidentifier() and attribute.isidentifier():
         return _from_module(text, module, attribute)
     raise InvalidValue(
-        f"policy = {text!r}: must be one of {', '.join(repr(name) for name in CATALOGUE)}, "
+        f"policy = {text!r}: must be one of {', '.join(repr(name) for name in REGISTRY)}, "
         "the folder of an agent, or module:function"
     )
 
 
-def choose_all(texts: Sequence[str]) -> list[Choice]:
+def choose_all(texts: Sequence[str]) -> list[PolicySpec]:
     """Policies from their names, folders or functions; a folder of agents of several seeds stands for all of them.
 
     Policies of one name are told apart by their seeds or else by what was asked for.
     """
     asked = list(dict.fromkeys(each for text in texts for each in _expanded(text)))
-    choices = [choose(text) for text in asked]
+    specs = [choose(text) for text in asked]
     for tell in (lambda text: Path(text).name.replace("-", " "), lambda text: text):
-        names = [choice.name for choice in choices]
-        choices = [
-            replace(choice, name=f"{choice.name}, {tell(text)}") if names.count(choice.name) > 1 else choice
-            for text, choice in zip(asked, choices, strict=True)
+        names = [spec.name for spec in specs]
+        specs = [
+            replace(spec, name=f"{spec.name}, {tell(text)}") if names.count(spec.name) > 1 else spec
+            for text, spec in zip(asked, specs, strict=True)
         ]
-    return choices
+    return specs
 
 
 def _expanded(text: str) -> list[str]:
     return [str(path) for path in learned.seeds(text)] or [text]
 
 
-def as_choice(policy: Policy) -> Choice:
+def as_spec(policy: Policy) -> PolicySpec:
     """A policy that is there already."""
-    return Choice(policy.name, lambda setting: policy)
+    return PolicySpec(policy.name, lambda context: policy)
 
 
 def _from_folder(folder: Path) -> Policy:
@@ -204,7 +205,7 @@ class FunctionPolicy:
         return speeds
 
 
-def _from_module(text: str, module: str, attribute: str) -> Choice:
+def _from_module(text: str, module: str, attribute: str) -> PolicySpec:
     """A policy from ``module:attribute``, the current folder included in the search.
 
     The attribute is a policy, a class or function that makes one when called without arguments, or a function of
@@ -225,17 +226,17 @@ def _from_module(text: str, module: str, attribute: str) -> Choice:
         if needed > 2:
             raise InvalidValue(f"policy = {text!r}: takes {needed} arguments, must take (observation) or (…, time)")
         if needed > 0 and not isinstance(found, type):
-            return Choice(text, lambda setting: FunctionPolicy(text, found, _seen(setting), takes_time=needed == 2))
+            return PolicySpec(text, lambda context: FunctionPolicy(text, found, _seen(context), takes_time=needed == 2))
         found = found()
         if not _is_policy(found):
             raise InvalidValue(
                 f"policy = {text!r}: made a {type(found).__name__}, must be a policy with name, knows, reset and act"
             )
-    return as_choice(found)
+    return as_spec(found)
 
 
-def _seen(setting: Setting) -> Knowledge:
-    return Knowledge.STATE if setting.observation == "state" else Knowledge.SENSORS
+def _seen(context: BuildContext) -> Knowledge:
+    return Knowledge.STATE if context.observation == "state" else Knowledge.SENSORS
 
 
 def _is_policy(thing: Any) -> bool:

@@ -21,7 +21,7 @@ from scipy.optimize import least_squares, minimize
 
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
-from agents.drives import (
+from agents.drives.functions import (
     Drive,
     HarmonicDrive,
     SplineDrive,
@@ -30,7 +30,7 @@ from agents.drives import (
     spline_matrices,
     uniform_harmonic_samples,
 )
-from agents.objectives import FINE_STEP, Objective, Outcome, coarse_step
+from agents.drives.objectives import FINE_STEP, Objective, Outcome, coarse_step
 
 FloatArray = npt.NDArray[np.float64]
 Family = Literal["spline", "harmonic"]

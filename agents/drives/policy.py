@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue
-from agents.drives import Drive
-from agents.optimisation import OptimisedDrive
+from agents.drives.functions import Drive
+from agents.drives.optimisation import OptimisedDrive
 from agents.policy import FloatArray, Knowledge
 
 

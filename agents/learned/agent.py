@@ -21,8 +21,8 @@ from aframe_env.scenario.sensors import Sensors
 from aframe_env.serialization import strict_converter, structure
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue
-from agents.features import Features, feature_names, features_for
-from agents.network import Actor
+from agents.learned.features import Features, feature_names, features_for
+from agents.learned.network import Actor
 from agents.policy import FloatArray, Knowledge
 
 FORMAT = 2

@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aframe_env import Harmonic, HarmonicMotion, InvalidValue, Scenario, ScenarioDistribution
-from agents import drive_map
-from agents.drive_map import DriveMap, Node, ideal_ratio, optimise_node
-from agents.drive_map_policy import DriveMapPolicy
-from agents.drives import HarmonicDrive, RampedDrive
-from agents.heave import Harmonics, Measurement, fit_harmonics, known_harmonics, tip_heave
-from agents.objectives import Objective
+from agents.drives import map as drive_map
+from agents.drives.forecast import Harmonics, Measurement, fit_harmonics, known_harmonics, tip_heave
+from agents.drives.functions import HarmonicDrive, RampedDrive
+from agents.drives.map import DriveMap, Node, ideal_ratio, optimise_node
+from agents.drives.map_policy import DriveMapPolicy
+from agents.drives.objectives import Objective
 from agents.policy import DrumStill, Knowledge
 from agents.rollout import held_out_scenarios, run
 

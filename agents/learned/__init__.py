@@ -1,0 +1,1 @@
+"""Learned agents: what their networks see and do, and how they are stored."""
