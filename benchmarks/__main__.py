@@ -23,8 +23,8 @@ from benchmarks.limit.library import NoCompiler, compiler_version
 from benchmarks.report import write_report
 from benchmarks.results import Machine, Run, Series
 from benchmarks.workers import NotMeasured, Pythons, Worker
-from train.config import parse
-from train.output import user_errors
+from train.shared.cli import parse
+from train.shared.run_folder import user_errors
 
 
 @dataclass(frozen=True)
@@ -165,7 +165,7 @@ def main() -> int:
     """Run the command."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with user_errors():
-        return run(parse(Options, __doc__ or ""), Console())
+        return run(parse(Options, "benchmarks", __doc__ or ""), Console())
 
 
 if __name__ == "__main__":

@@ -24,10 +24,10 @@ from aframe_env.scenario import ScenarioDistribution
 from aframe_env.torch_env import AFrameHeaveTorchEnv
 from aframe_env.validation import require_integer, require_number
 from benchmarks import learner
-from train import gpu_ppo
-from train.config import parse
-from train.learning import to_policy
-from train.output import user_errors, versions, write_json
+from train.learn import ppo_rsl
+from train.learn.run import to_policy
+from train.shared.cli import parse
+from train.shared.run_folder import user_errors, versions, write_json
 
 PERIOD: Final = 0.1
 WARM: Final = 10
@@ -136,16 +136,16 @@ def measure(rows: int, options: Options, device: torch.device, bandwidth: float)
     return Speed(rows, samples, share, most)
 
 
-def learn(target: float, options: Options, chosen: gpu_ppo.Options) -> Learned:
+def learn(target: float, options: Options, chosen: ppo_rsl.Options) -> Learned:
     """Learn until the target; the clock stands still while it is looked at."""
-    built = gpu_ppo.build(chosen)
+    built = ppo_rsl.build(chosen)
     limits = learner.Options(target=target, scenarios=options.scenarios, limit=options.limit)
     clock = learner.Clock(lambda: to_policy(built, chosen)[0], limits)
     built.model.learn(chosen.timesteps, callback=clock)
     return Learned(target, clock.reached, clock.seconds, built.model.num_timesteps, clock.reductions)
 
 
-def run(options: Options, device: torch.device, chosen: gpu_ppo.Options, console: Console) -> None:
+def run(options: Options, device: torch.device, chosen: ppo_rsl.Options, console: Console) -> None:
     """Measure, print and write."""
     bandwidth = copy_bandwidth(device)
     name = torch.cuda.get_device_name(device) if device.type == "cuda" else "processor"
@@ -176,8 +176,8 @@ def run(options: Options, device: torch.device, chosen: gpu_ppo.Options, console
 def main() -> int:
     """Run the command."""
     with user_errors():
-        options = parse(Options, __doc__ or "")
-        run(options, open_device("cuda"), gpu_ppo.Options(), Console())
+        options = parse(Options, "benchmarks.gpu", __doc__ or "")
+        run(options, open_device("cuda"), ppo_rsl.Options(), Console())
     return 0
 
 

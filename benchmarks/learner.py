@@ -27,11 +27,11 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 import aframe_env  # noqa: F401  (registers the environment)
 from agents.policy import DrumStill, FloatArray, Knowledge, Policy
 from agents.rollout import run
-from train import ppo
-from train.config import parse
-from train.learning import to_policy
-from train.output import user_errors, versions, write_json
-from train.tune import validation_scenarios
+from train.learn import ppo
+from train.learn.run import to_policy
+from train.learn.tune import validation_scenarios
+from train.shared.cli import parse
+from train.shared.run_folder import user_errors, versions, write_json
 
 LOOKS_EVERY: Final = 16_384
 """Control steps between two looks."""
@@ -195,7 +195,7 @@ def plain(seed: int, options: Options) -> Outcome:
 def main() -> int:
     """Run the command."""
     with user_errors():
-        options, console = parse(Options, __doc__ or ""), Console()
+        options, console = parse(Options, "benchmarks.learner", __doc__ or ""), Console()
         torch.set_num_threads(1)
         outcomes = []
         for seed in range(options.rounds):

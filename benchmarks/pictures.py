@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from benchmarks.bars import number
 from benchmarks.catalogue import COST_ROWS, ENVPOOL
 from benchmarks.results import Run
-from train.output import write_atomically
+from train.shared.run_folder import write_atomically
 
 OURS, THEIRS, LIMIT = "#0b6e99", "#8a8f98", "#d9822b"
 

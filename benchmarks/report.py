@@ -11,7 +11,7 @@ from benchmarks.bars import ENVPOOL_64_KEYS, ENVPOOL_KEYS, Verdict, best_of, num
 from benchmarks.catalogue import MEASURES
 from benchmarks.pictures import draw
 from benchmarks.results import Run
-from train.output import write_json, write_text
+from train.shared.run_folder import write_json, write_text
 
 HEADINGS = ("what", "bar", "measured", "peer", "ratio", "met")
 NOTES = """\

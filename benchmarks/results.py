@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from aframe_env.serialization import strict_converter, structure
 from aframe_env.validation import InvalidValue
-from train.output import versions, write_json
+from train.shared.run_folder import versions, write_json
 
 NOT_ASKED: Final = "not measured in this run"
 

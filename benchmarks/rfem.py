@@ -22,7 +22,7 @@ from aframe_env.dynamics.flexible.readout import FEET, UTILISATION
 from aframe_env.flexible_engine import FlexibleEngine, Mesh
 from aframe_env.rfem.simulate import DynamicCase, simulate
 from aframe_env.rfem.structure import Division
-from train.output import versions, write_json
+from train.shared.run_folder import versions, write_json
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -33,7 +33,7 @@ from aframe_env.flexible_engine import FlexibleEngine, Mesh
 from aframe_env.rfem.reference import time_series
 from aframe_env.rfem.structure import Division
 from benchmarks.peer_case import case_of
-from train.output import versions, write_json
+from train.shared.run_folder import versions, write_json
 
 FloatArray = npt.NDArray[np.float64]
 Start = Literal["comoving", "rest"]

@@ -5,12 +5,9 @@ Writes comparison.json and comparison.md (evaluations and least Ω1 of each) and
 
 from __future__ import annotations
 
-import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from datetime import datetime
-from pathlib import Path
 
 from rich.console import Console
 from rich.progress import Progress
@@ -20,14 +17,15 @@ from aframe_env.validation import require_integer
 from agents.drives.objectives import Objective, coarse_step
 from agents.drives.optimisation import FAMILIES, OPTIMISERS, Family, Optimiser, optimise
 from agents.rollout import held_out_scenarios
-from train.config import parse
-from train.drives import paper_case
-from train.output import new_folder, user_errors, versions, write_json, write_text
-from train.tasks import run_tasks
+from train.drives.experiment import paper_case
+from train.shared.cli import parse
+from train.shared.jobs import run_jobs
+from train.shared.markdown import table
+from train.shared.run_folder import RunOptions, open_run, user_errors, write_json, write_text
 
 
-@dataclass(frozen=True)
-class Options:
+@dataclass(frozen=True, kw_only=True)
+class Options(RunOptions):
     """How much to compare."""
 
     scenarios: int = 5
@@ -36,10 +34,6 @@ class Options:
     """Most evaluations of the objective for each drive."""
     workers: int | None = None
     """Worker processes; by default one for each core."""
-    out: Path | None = None
-    """Output folder; by default runs/optimisers-DATE-TIME."""
-    overwrite: bool = False
-    """Write into the output folder even if it has something in it."""
 
     def __post_init__(self) -> None:
         require_integer("scenarios", self.scenarios, low=0, high=10_000)
@@ -101,15 +95,15 @@ def markdown(found: Sequence[Found]) -> str:
     heads = ["scenario", "drive", "variables", "Ω1 still, m² s"]
     for optimiser in OPTIMISERS:
         heads += [f"Ω1 {optimiser}, m² s", f"evaluations {optimiser}"]
-    lines = ["| " + " | ".join(heads) + " |", "|" + " --- |" * len(heads)]
+    lines = []
     for (scenario, family), pair in pairs.items():
         first = pair[OPTIMISERS[0]]
         name = "paper" if scenario is None else f"held-out {scenario}"
         cells = [name, family, str(first.variables), f"{first.still:.4g}"]
         for optimiser in OPTIMISERS:
             cells += [f"{pair[optimiser].omega1:.4g}", f"{pair[optimiser].evaluations:,}"]
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines) + "\n"
+        lines.append(cells)
+    return table(heads, lines)
 
 
 INTRODUCTION = """\
@@ -123,10 +117,8 @@ gives a column of Gauss-Newton's Jacobian counts as an evaluation; at most {limi
 def main() -> int:
     """Run the command."""
     with user_errors():
-        options, console = parse(Options, __doc__ or ""), Console()
-        folder = new_folder(
-            options.out or Path("runs") / f"optimisers-{datetime.now():%Y%m%d-%H%M%S}", overwrite=options.overwrite
-        )
+        options, console = parse(Options, "train.optimisers", __doc__ or ""), Console()
+        opened = open_run(options, "train.optimisers")
         searches = [
             Search(scenario=scenario, family=family, optimiser=optimiser, max_evaluations=options.max_evaluations)
             for scenario in (None, *range(options.scenarios))
@@ -135,16 +127,15 @@ def main() -> int:
         ]
         try:
             with Progress(console=console) as progress:
-                found = run_tasks(solve, searches, workers=options.workers, progress=progress, description="searches")
+                found = run_jobs(solve, searches, workers=options.workers, progress=progress, description="searches")
         except KeyboardInterrupt:
             console.print("interrupted: nothing was written")
             return 130
-        command = shlex.join(["python", "-m", "train.optimisers", *sys.argv[1:]])
-        text = INTRODUCTION.format(command=command, limit=options.max_evaluations) + markdown(found)
+        text = INTRODUCTION.format(command=opened.command, limit=options.max_evaluations) + markdown(found)
         console.print(text, soft_wrap=True, markup=False)
-        write_text(folder / "comparison.md", text)
-        write_json(folder / "comparison.json", [asdict(each) for each in found])
-        write_json(folder / "run.json", {"command": command, "versions": versions()})
+        write_text(opened.folder / "comparison.md", text)
+        write_json(opened.folder / "comparison.json", [asdict(each) for each in found])
+        opened.record(options)
     return 0
 
 

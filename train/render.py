@@ -21,8 +21,8 @@ from rich.console import Console
 import aframe_env
 from aframe_env.scenario import ScenarioDistribution
 from aframe_env.validation import InvalidValue, require_integer, require_number
-from train.config import parse
-from train.output import new_file, user_errors, write_atomically
+from train.shared.cli import parse
+from train.shared.run_folder import new_file, user_errors, write_atomically
 
 _CATCH_UP = 0.5
 """Speed at which the rope paid out catches up with each metre of the pulley's heave, 1/s."""
@@ -95,7 +95,7 @@ def run(options: Options, console: Console) -> int:
 def main() -> int:
     """Run the command."""
     with user_errors():
-        return run(parse(Options, __doc__ or ""), Console())
+        return run(parse(Options, "train.render", __doc__ or ""), Console())
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import io
-import shlex
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,8 +28,8 @@ from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.regulator import Gains
 from agents.policy import DrumStill, FloatArray, Policy
 from agents.rollout import HELD_OUT_SEED, run
-from train.config import parse, to_toml
-from train.output import new_folder, user_errors, versions, write_json, write_text
+from train.shared.cli import parse
+from train.shared.run_folder import RunOptions, open_run, user_errors, write_text
 
 Name = Literal["state", "sensors", "inverse-dynamics"]
 
@@ -51,8 +50,8 @@ TUNABLE: dict[Name, Tunable] = {
 }
 
 
-@dataclass(frozen=True)
-class Options:
+@dataclass(frozen=True, kw_only=True)
+class Options(RunOptions):
     """What to tune, on how much."""
 
     policies: tuple[Name, ...] = tuple(TUNABLE)
@@ -63,10 +62,8 @@ class Options:
     """Gains to try for each policy."""
     seed: int = 1
     """Of the training scenarios; never that of the held-out ones."""
-    out: Path = Path("runs/control")
+    out: Path | None = Path("runs/control")
     """Output folder."""
-    overwrite: bool = False
-    """Write into the output folder even if it has something in it."""
 
     def __post_init__(self) -> None:
         require_integer("scenarios", self.scenarios, low=1, high=10**6)
@@ -127,11 +124,9 @@ def study(tunable: Tunable, options: Options, tried: Callable[[Trial], object]) 
 def main() -> int:
     """Run the command."""
     with user_errors():
-        options, console = parse(Options, __doc__ or ""), Console()
-        folder = new_folder(options.out, overwrite=options.overwrite)
-        write_text(folder / "config.toml", to_toml(options))
-        command = shlex.join(["python", "-m", "train.tune_control", *sys.argv[1:]])
-        write_json(folder / "run.json", {"command": command, "versions": versions()})
+        options, console = parse(Options, "train.tune_control", __doc__ or ""), Console()
+        opened = open_run(options, "train.tune_control")
+        opened.record(options)
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(["policy", "effort_s2", "share", "mean", "median", "fifth", "worst"])
@@ -148,7 +143,7 @@ def main() -> int:
                     f"{name}: {best.gains}: mean {best.mean:.2%}, median {best.median:.2%}, "
                     f"5th percentile {best.fifth:.1%}, worst {best.worst:.1%}"
                 )
-                write_text(folder / "trials.csv", text.getvalue())
+                write_text(opened.folder / "trials.csv", text.getvalue())
     return 0
 
 

@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from train.output import write_atomically
+from train.shared.run_folder import write_atomically
 
 SOURCE: Final = Path(__file__).with_name("limit.cpp")
 FLAGS: Final = ("-O3", "-march=native", "-ffast-math", "-fopenmp", "-fPIC")

@@ -18,7 +18,7 @@ from agents.drives.functions import spline_matrices
 from agents.drives.objectives import Objective, coarse_step
 from agents.drives.optimisation import required_angle
 from benchmarks.peers.serve import Measurement, serve, speed
-from train.drives import paper_case
+from train.drives.experiment import paper_case
 
 FloatArray = npt.NDArray[np.float64]
 

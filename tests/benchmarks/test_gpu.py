@@ -14,14 +14,14 @@ pytest.importorskip("rsl_rl", reason='rsl-rl-lib is not installed (extra "cuda")
 from aframe_env.dynamics import layout as at
 from aframe_env.scenario import ScenarioDistribution
 from benchmarks import gpu
-from train import gpu_ppo
+from train.learn import ppo_rsl
 
 
 def test_figures_of_a_small_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gpu, "copy_bandwidth", lambda device: 1e10)
     out = tmp_path / "gpu.json"
     options = gpu.Options(rows=(3, 5), steps=2, rounds=3, targets=(-1e9, 1.1), scenarios=2, limit=1e-3, out=out)
-    chosen = gpu_ppo.Options(device="cpu", n_envs=1024, n_steps=16, batch_size=8192, n_epochs=1, timesteps=40_000)
+    chosen = ppo_rsl.Options(device="cpu", n_envs=1024, n_steps=16, batch_size=8192, n_epochs=1, timesteps=40_000)
     gpu.run(options, torch.device("cpu"), chosen, Console(quiet=True))
     found = json.loads(out.read_text())
     assert [speed["rows"] for speed in found["speeds"]] == [3, 5]

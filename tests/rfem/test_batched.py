@@ -23,7 +23,7 @@ from aframe_env.scenario.crane import Crane
 from aframe_env.scenario.cross_sections import Material, Servomotor
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion
 from aframe_env.validation import SmallRotationWarning
-from train.verification import run_checks
+from train.verify import run_checks
 
 COARSE = Division(leg=5, beam=2)
 STILL = np.zeros(1)

@@ -13,7 +13,7 @@ from aframe_env.scenario.crane import Crane
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion
 from aframe_env.scenario.recorded_motion import RecordedMotion
 from aframe_env.validation import InvalidValue
-from train.verification.frame_checks import model
+from train.verify.frame_checks import model
 
 TURNING = HarmonicMotion(
     harmonics=(

@@ -4,7 +4,7 @@ import pytest
 from aframe_env.rfem.modes import frame_modes
 from aframe_env.scenario.crane import Crane
 from aframe_env.validation import InvalidValue
-from train.verification.frame_checks import model, natural_modes
+from train.verify.frame_checks import model, natural_modes
 
 
 def test_first_ten_frequencies():

@@ -17,8 +17,8 @@ from aframe_env.scenario.crane import Crane
 from aframe_env.scenario.cross_sections import Material, Servomotor
 from aframe_env.scenario.motion import HarmonicMotion
 from aframe_env.validation import InvalidValue, SmallRotationWarning
-from train.verification import run_checks
-from train.verification.frame_checks import model
+from train.verify import run_checks
+from train.verify.frame_checks import model
 
 LIGHT = Scenario.paper(motion=HarmonicMotion(), load_mass=500.0)
 STROKE = 20e-3

@@ -17,9 +17,9 @@ from aframe_env.scenario.crane import Crane
 from aframe_env.scenario.cross_sections import Material, Servomotor
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion
 from aframe_env.validation import InvalidValue, SmallRotationWarning
-from train.verification import run_checks
-from train.verification.cases import columns_of
-from train.verification.frame_checks import CASES, model, order
+from train.verify import run_checks
+from train.verify.cases import columns_of
+from train.verify.frame_checks import CASES, model, order
 
 STILL = Scenario.paper(motion=HarmonicMotion())
 

@@ -12,8 +12,8 @@ from aframe_env.rfem.structure import Division
 from aframe_env.scenario.crane import Crane
 from aframe_env.scenario.cross_sections import Servomotor
 from aframe_env.validation import InvalidValue
-from train.verification import frame_checks
-from train.verification.frame_checks import CASES, DETERMINATE, flat, model
+from train.verify import frame_checks
+from train.verify.frame_checks import CASES, DETERMINATE, flat, model
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ import pytest
 from aframe_env.rfem.beam import Member, divide
 from aframe_env.rfem.straight_beam import bending_frequencies
 from aframe_env.scenario.cross_sections import Material, SolidRectangle
-from train.verification.closed_forms import exact_frequencies
-from train.verification.frame_checks import beam_frequencies, straight_member
+from train.verify.closed_forms import exact_frequencies
+from train.verify.frame_checks import beam_frequencies, straight_member
 
 
 def test_frequencies_are_as_good_as_the_table_and_second_order():

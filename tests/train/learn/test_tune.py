@@ -1,0 +1,68 @@
+import csv
+
+import pytest
+
+from train.learn import tune
+from train.learn.registry import find_learner
+
+TINY = ("--timesteps", 256, "--scenarios", 3)
+
+
+def command(monkeypatch, *arguments):
+    monkeypatch.setattr("sys.argv", ["train.tune", *map(str, arguments)])
+    return tune.main()
+
+
+def trials(folder):
+    with (folder / "trials.csv").open() as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch):
+    spec = find_learner("ppo")
+    smaller = tune.replace(spec, options=lambda: tune.replace(spec.options(), n_envs=32))
+    monkeypatch.setattr(tune, "find_learner", {"ppo": smaller}.get)
+
+
+def test_a_search_goes_on_where_it_ended(tmp_path, monkeypatch):
+    out = tmp_path / "study"
+    assert command(monkeypatch, *TINY, "--trials", 1, "--out", out) == 0
+    first = trials(out)
+    assert command(monkeypatch, *TINY, "--trials", 2, "--out", out) == 0
+    both = trials(out)
+    assert both[:1] == first
+    assert len(both) == 2
+    defaults = find_learner("ppo").options()
+    assert float(first[0]["learning_rate"]) == defaults.learning_rate
+    assert float(both[1]["learning_rate"]) != defaults.learning_rate
+
+    assert command(monkeypatch, *TINY, "--trials", 3, "--out", out) == 0
+    assert trials(out)[2]["learning_rate"] not in [trial["learning_rate"] for trial in both]
+    table = (out / "study.md").read_text().splitlines()
+    assert f"{max(float(trial['median']) for trial in trials(out)):.2%}" in table[2]
+    assert len(table) == 5
+
+
+def test_another_search_in_the_same_folder_is_refused(tmp_path, monkeypatch, capsys):
+    out = tmp_path / "study"
+    assert command(monkeypatch, *TINY, "--trials", 1, "--out", out) == 0
+    kept = (out / "journal.log").read_bytes()
+    with pytest.raises(SystemExit):
+        command(monkeypatch, "--timesteps", 512, "--scenarios", 3, "--trials", 1, "--out", out)
+    assert "a search with other options" in capsys.readouterr().err
+    assert (out / "journal.log").read_bytes() == kept
+
+
+def test_bad_options_are_one_clear_line(tmp_path, monkeypatch, capsys):
+    with pytest.raises(SystemExit):
+        command(monkeypatch, "--trials", 0, "--out", tmp_path / "study")
+    assert "trials = 0: must be in [1, 1000000]" in capsys.readouterr().err
+    assert not (tmp_path / "study").exists()
+
+
+def test_validation_scenarios_are_not_the_held_out_ones():
+    from agents.rollout import held_out_scenarios
+
+    held_out = held_out_scenarios(tune.ScenarioDistribution(), 50)
+    assert not {s.load_mass for s in held_out} & {s.load_mass for s in tune.validation_scenarios(50)}

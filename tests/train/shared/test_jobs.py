@@ -1,0 +1,192 @@
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from aframe_env import InvalidValue
+from train.shared.job_store import JobStore
+from train.shared.jobs import JobsFailed, WorkerDied, run_jobs
+
+
+@dataclass(frozen=True)
+class Cell:
+    number: int
+    folder: str = ""
+
+
+@dataclass(frozen=True)
+class Square:
+    value: int
+    parts: tuple[float, ...]
+
+
+def squared(cell):
+    if cell.folder:
+        # What was computed, and how often, as the file system saw it.
+        with (Path(cell.folder) / "computed").open("a") as log:
+            log.write(f"{cell.number}\n")
+    return Square(cell.number**2, (0.1 * cell.number, 1.0 / 3.0))
+
+
+def dies_once(path):
+    marker = Path(path)
+    if not marker.exists():
+        marker.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 1
+
+
+def dies(number):
+    if number == 1:
+        os._exit(3)
+    return number
+
+
+def refuses(number):
+    if number % 2:
+        raise ValueError(f"{number} is odd")
+    return number
+
+
+def threads(_):
+    import numba
+
+    return os.environ["OMP_NUM_THREADS"], numba.config.NUMBA_NUM_THREADS
+
+
+def store_in(folder, version="1"):
+    return JobStore(Path(folder) / "cells.sqlite", Square, version)
+
+
+def computed(folder):
+    log = Path(folder) / "computed"
+    return sorted(map(int, log.read_text().split())) if log.exists() else []
+
+
+def test_results_come_in_the_order_of_the_items(tmp_path):
+    cells = [Cell(n, str(tmp_path)) for n in (3, 1, 2)]
+    assert [s.value for s in run_jobs(squared, cells, workers=2)] == [9, 1, 4]
+    assert computed(tmp_path) == [1, 2, 3]
+    assert run_jobs(squared, []) == []
+
+
+def test_a_store_gives_back_what_was_computed_bit_for_bit_and_computes_the_rest(tmp_path):
+    cells = [Cell(n, str(tmp_path)) for n in range(4)]
+    with store_in(tmp_path) as store:
+        first = run_jobs(squared, cells[:3], store=store, workers=1)
+    with store_in(tmp_path) as store:
+        again = run_jobs(squared, [*cells, cells[0]], store=store, workers=1)
+    assert again[:3] == first
+    assert again[4] == again[0]
+    assert computed(tmp_path) == [0, 1, 2, 3]
+
+
+def test_configuration_version_and_type_of_the_result_make_the_key(tmp_path):
+    with store_in(tmp_path) as store, store_in(tmp_path, "2") as newer:
+        keys = {store.key(Cell(2)), store.key(Cell(3)), store.key({"number": 2}), newer.key(Cell(2))}
+        assert len(keys) == 4
+        assert store.key(Cell(2)) == store.key({"folder": "", "number": 2})
+
+
+def test_a_key_of_ones_own_decides_what_is_computed_once(tmp_path):
+    cells = [Cell(n, str(tmp_path)) for n in (1, 2, -1)]
+    with store_in(tmp_path) as store:
+        found = run_jobs(squared, cells, lambda cell: abs(cell.number), store=store, workers=1)
+    assert [s.parts[0] for s in found] == pytest.approx([0.1, 0.2, 0.1])
+    assert computed(tmp_path) == [1, 2]
+
+
+def test_a_worker_that_dies_is_replaced_and_its_task_tried_again(tmp_path):
+    items = [str(tmp_path / "marker0"), str(tmp_path / "marker0")]
+    assert run_jobs(dies_once, items, workers=1, attempts=2) == [1, 1]
+
+
+def test_a_task_that_always_kills_its_worker_is_reported_and_the_others_are_done(tmp_path):
+    with JobStore(tmp_path / "cells.sqlite", int, "1") as store:
+        with pytest.raises(JobsFailed, match=r"1 of 4 jobs failed; the first, job 1: .*2 attempts") as failed:
+            run_jobs(dies, [0, 1, 2, 3], store=store, workers=2, attempts=2)
+        assert isinstance(failed.value.failures[0][1], WorkerDied)
+        assert sorted(store.read([store.key(n) for n in range(4)]).values()) == [0, 2, 3]
+
+
+def test_a_task_that_raises_is_reported_with_its_own_error():
+    with pytest.raises(JobsFailed, match="2 of 4 jobs failed") as failed:
+        run_jobs(refuses, [0, 1, 2, 3], workers=1)
+    assert [(i, str(e)) for i, e in failed.value.failures] == [(1, "1 is odd"), (3, "3 is odd")]
+
+
+def test_workers_compute_with_one_thread_and_leave_the_parent_as_it_was():
+    before = dict(os.environ)
+    assert run_jobs(threads, [0], workers=1) == [("1", 1)]
+    assert dict(os.environ) == before
+
+
+SWEEP = """
+import sys, time
+from pathlib import Path
+from train.shared.job_store import JobStore
+from train.shared.jobs import run_jobs
+
+def slow(number):
+    (Path(sys.argv[1]) / f"begun{number}").touch()
+    time.sleep(0.1 if number < 3 else 600.0)
+    return number
+
+if __name__ == "__main__":
+    with JobStore(Path(sys.argv[1]) / "cells.sqlite", int, "1") as store:
+        try:
+            run_jobs(slow, range(6), store=store, workers=2)
+        except KeyboardInterrupt:
+            sys.exit(130)
+"""
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+def test_an_interrupted_sweep_loses_only_what_was_in_flight(tmp_path, how):
+    script = tmp_path / "sweep.py"
+    script.write_text(SWEEP)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    process = subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path)], env=environment, start_new_session=True, stdout=subprocess.DEVNULL
+    )
+    # Tasks 3 and 4 begin only when a worker is free: 0, 1 and 2 have then been handed back.
+    until = time.monotonic() + 60.0
+    while not all((tmp_path / f"begun{n}").exists() for n in range(5)) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert process.poll() is None
+    if how == signal.SIGINT:
+        os.killpg(process.pid, how)
+    else:
+        process.kill()
+    status = process.wait(timeout=60.0)
+    assert status == (130 if how == signal.SIGINT else -signal.SIGKILL)
+    with JobStore(tmp_path / "cells.sqlite", int, "1") as store:
+        kept = store.read([store.key(n) for n in range(6)])
+        assert sorted(kept.values()) == [0, 1, 2]
+    # The workers, asleep in the middle of their tasks for ten minutes, have gone too.
+    while group := _members(process.pid):
+        assert time.monotonic() < until, group
+        time.sleep(0.05)
+
+
+def _members(session):
+    found = subprocess.run(["ps", "-o", "pid=,stat=", "-s", str(session)], capture_output=True, text=True).stdout
+    return [line for line in found.splitlines() if " Z" not in line]
+
+
+def test_a_store_that_is_something_else_is_refused(tmp_path):
+    path = tmp_path / "cells.sqlite"
+    path.write_text("not a database, and long enough to look at" * 50)
+    with pytest.raises(InvalidValue, match="not a results store"):
+        JobStore(path, int, "1")
+
+
+@pytest.mark.parametrize(("name", "value"), [("attempts", 0), ("workers", 0)])
+def test_bad_arguments_are_named(name, value):
+    with pytest.raises(InvalidValue, match=f"{name} = 0: must be in"):
+        run_jobs(squared, [], **{name: value})

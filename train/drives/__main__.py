@@ -1,0 +1,76 @@
+"""Optimise drum drives for one scenario, as in the paper's section 4: ``python -m train.drives --case paper``.
+
+Writes summary.json and summary.csv (figures of merit), drives.json (decision variables), histories.csv, pictures, and
+notes.md (what was assumed, and where it differs from the paper) into the output folder.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from aframe_env.scenario.file import read_scenario, scenario_text
+from agents.drives.optimisation import Progress as SearchProgress
+from train.drives.experiment import PAPER_DAMPING_RATIO, Options, checked, paper_case, solve, variants
+from train.drives.figures import draw
+from train.drives.notes import notes
+from train.drives.results import HEADINGS, write_results
+from train.shared.cli import parse
+from train.shared.run_folder import open_run, user_errors, write_text
+
+
+def run(options: Options, console: Console) -> int:
+    """Optimise, print, write; return the exit status."""
+    scenario = paper_case() if options.scenario is None else read_scenario(options.scenario)
+    opened = open_run(options, "train.drives")
+    folder, command = opened.folder, opened.command
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:,} {task.fields[unit]}"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console) as bars:
+
+        def follow(label: str) -> SearchProgress:
+            bar = bars.add_task(label, total=options.max_evaluations, unit="evaluations")
+            return lambda count, best: bars.update(bar, completed=count, unit=f"evaluations, best {best:.4g}")
+
+        try:
+            experiment = solve(scenario, options, follow)
+            for bar in bars.task_ids:
+                bars.update(bar, total=bars.tasks[bar].completed)
+            if options.check is not None:
+                experiment = checked(scenario, options.duration, experiment, bars)
+            others = variants(options, bars) if options.scenario is None else []
+        except KeyboardInterrupt:
+            console.print("interrupted: nothing was written")
+            return 130
+    table = Table(title=f"Optimised drives over {options.duration:g} s", box=SIMPLE, padding=0)
+    for heading in HEADINGS:
+        table.add_column(heading, justify="left" if heading == "drive" else "right", no_wrap=True)
+    for result in experiment.results:
+        table.add_row(*result.row.cells)
+    console.print(table)
+    write_results(folder, experiment)
+    winch = scenario.crane.winch
+    draw(folder, scenario.target_level, winch.drum_radius, experiment)
+    write_text(folder / "notes.md", notes(command, winch, experiment, others, PAPER_DAMPING_RATIO))
+    opened.record(options, seed=options.seed)
+    write_text(folder / "scenario.toml", scenario_text(scenario))
+    console.print(f"written: {folder} (notes.md says what was assumed)")
+    return 0
+
+
+def main() -> int:
+    """Run the command."""
+    with user_errors():
+        return run(parse(Options, "train.drives", __doc__ or ""), Console())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

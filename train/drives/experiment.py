@@ -1,0 +1,156 @@
+"""The drives of one scenario, as in the paper's section 4: the search, the full model, other starts and dampings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+from rich.progress import Progress
+
+from aframe_env.scenario import Initial, Scenario
+from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
+from agents.drives.objectives import FINE_STEP, Objective, coarse_step
+from agents.drives.optimisation import (
+    FAMILIES,
+    OBJECTIVES,
+    OPTIMISERS,
+    Family,
+    ObjectiveName,
+    Optimiser,
+    optimise,
+    required_angle,
+)
+from agents.drives.optimisation import Progress as SearchProgress
+from train.drives.full_model import transfer
+from train.drives.notes import Variant
+from train.drives.results import Experiment, Result, SummaryRow
+from train.shared.run_folder import RunOptions
+
+PAPER_DAMPING_RATIO = 0.03
+"""Damping of the load's bobbing on the rope in ``--case paper``, share of critical: the middle of the range that
+scenarios are drawn from. The paper states no figure."""
+VARIANTS: tuple[tuple[Initial, float], ...] = (
+    ("rest", 0.0),
+    ("rest", 0.05),
+    ("comoving", PAPER_DAMPING_RATIO),
+    ("comoving", 0.0),
+)
+"""Other starts of the load and rope dampings that the notes show."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(RunOptions):
+    """What to optimise, and for which scenario."""
+
+    case: Literal["paper"] | None = None
+    """A case by name; "paper" (the default when there is no --scenario) is the paper's section 4."""
+    scenario: Path | None = None
+    """Any scenario, from a TOML file."""
+    drive: Literal["spline", "harmonic", "both"] = "both"
+    """Family of drives."""
+    objective: Literal["omega1", "omega2", "both"] = "both"
+    """What is made least: omega1 = ∫(x−h)² dt, omega2 = max|x−h|."""
+    optimiser: Optimiser = "nelder-mead"
+    """What finds the least Ω1: the paper's Nelder-Mead, or Gauss-Newton. Ω2 is Nelder-Mead's in either case."""
+    duration: float = 36.0
+    """How long the drive runs, s."""
+    intervals: int = 18
+    """Intervals of the spline."""
+    harmonics: int = 1
+    """Harmonics of the pseudo-harmonic drive."""
+    max_evaluations: int = 20_000
+    """Most evaluations of the objective for each drive."""
+    seed: int = 0
+    """Turns the simplexes of the restarts."""
+    check: Literal["rfem"] | None = None
+    """Model to run the drives in once more: "rfem" is the full one, with the frame flexible."""
+
+    def __post_init__(self) -> None:
+        if self.case is not None and self.scenario is not None:
+            raise InvalidValue("case, scenario: give one of the two")
+        require_choice("drive", self.drive, (*FAMILIES, "both"))
+        require_choice("objective", self.objective, (*OBJECTIVES, "both"))
+        require_choice("optimiser", self.optimiser, OPTIMISERS)
+        require_number("duration", self.duration, "s", low=0.1, high=3600.0)
+        require_integer("intervals", self.intervals, low=3, high=500)
+        require_integer("harmonics", self.harmonics, low=1, high=64)
+        require_integer("max_evaluations", self.max_evaluations, low=1, high=10**9)
+        require_integer("seed", self.seed, low=0, high=2**32 - 1)
+
+    @property
+    def families(self) -> tuple[Family, ...]:
+        """Families asked for."""
+        return FAMILIES if self.drive == "both" else (self.drive,)
+
+    @property
+    def objectives(self) -> tuple[ObjectiveName, ...]:
+        """Objectives asked for."""
+        return OBJECTIVES if self.objective == "both" else (self.objective,)
+
+
+def paper_case(initial: Initial = "rest", damping_ratio: float = PAPER_DAMPING_RATIO) -> Scenario:
+    """Scenario of ``--case paper``, or a variant of it."""
+    scenario = Scenario.paper(initial=initial)
+    critical = 2.0 * scenario.load_mass * scenario.rope_frequency
+    return replace(scenario, rope_damping=damping_ratio * critical)
+
+
+def solve(scenario: Scenario, options: Options, follow: Callable[[str], SearchProgress | None]) -> Experiment:
+    """Leave the drum still, and find every drive asked for.
+
+    ``follow`` is called with a drive's label and returns what its search reports its progress to.
+    """
+    objective = Objective(scenario, options.duration, min(FINE_STEP, coarse_step(scenario)))
+    times, error = objective.trajectory()
+    still = objective.still()
+    row = SummaryRow("still", None, still.omega1, still.omega2, still.rms, still.amplitude, 0, 0.0)
+    results = [Result(row, None, error)]
+    for family in options.families:
+        for name in options.objectives:
+            found = optimise(
+                family,
+                scenario,
+                name,
+                options.duration,
+                options.intervals,
+                options.harmonics,
+                options.seed,
+                options.max_evaluations,
+                follow(f"{family[0].upper()}-Ω{name[-1]}"),
+                optimiser=options.optimiser,
+            )
+            row = SummaryRow(
+                family,
+                name,
+                found.omega1,
+                found.omega2,
+                found.rms,
+                found.amplitude,
+                found.evaluations,
+                round(found.seconds, 3),
+            )
+            results.append(Result(row, found.drive, objective.trajectory(found.drive)[1]))
+    return Experiment(times, required_angle(objective)[::2], tuple(results))
+
+
+def checked(scenario: Scenario, duration: float, experiment: Experiment, bars: Progress) -> Experiment:
+    """Run every drive in the full model too."""
+    bar = bars.add_task("full model", total=len(experiment.results), unit="runs")
+    results = []
+    for result in experiment.results:
+        results.append(replace(result, full=transfer(scenario, duration, result)))
+        bars.advance(bar)
+    return replace(experiment, results=tuple(results))
+
+
+def variants(options: Options, bars: Progress) -> list[Variant]:
+    """The paper's case with other starts and rope dampings, which the paper does not state."""
+    found = []
+    bar = bars.add_task("other starts and dampings", total=len(VARIANTS), unit="variants")
+    for initial, ratio in VARIANTS:
+        experiment = solve(paper_case(initial, ratio), options, lambda label: None)
+        found.append(Variant(initial, ratio, experiment.results))
+        bars.advance(bar)
+    return found

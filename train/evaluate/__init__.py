@@ -1,0 +1,1 @@
+"""The comparison of policies on the same held-out scenarios."""

@@ -1,0 +1,81 @@
+"""Compare policies on the same held-out scenarios: ``python -m train.evaluate --policies results/agents/ppo S-Ω1``.
+
+A policy is a name ("S-Ω1", or s-omega1 on a keyboard without Ω), the folder of an agent, or module:function for your
+own: see ``agents.registry``. The drum left alone is always there as the yardstick. Writes the table (Markdown, JSON,
+PNG), every episode (CSV, Parquet), and report.html: one page with figures, pictures and the worst cases, which opens in
+any browser, offline.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from importlib.util import find_spec
+
+from rich.console import Console
+
+from aframe_env.validation import InvalidValue
+from agents.registry import choose_all
+from train.evaluate.run import AFTER_TRAINING, HeldOut, run_all, write
+from train.shared.cli import parse
+from train.shared.run_folder import RunOptions, open_run, user_errors
+
+REPORT_PACKAGES = ("jinja2", "plotly", "pyarrow")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(HeldOut, RunOptions):
+    """Which policies, on what."""
+
+    policies: tuple[str, ...] = (
+        "results/agents/ppo",
+        "results/agents/sac",
+        "results/agents/ppo-sensors",
+        "results/agents/sac-sensors",
+        "results/drive-map",
+        *AFTER_TRAINING,
+        "predictive control",
+        "inverse dynamics",
+    )
+    """Names, folders of agents (of all seeds, where there are several), or module:function."""
+    report: bool = True
+    """Write report.html and episodes.parquet too (extra "report")."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        missing = [name for name in REPORT_PACKAGES if find_spec(name) is None]
+        if self.report and missing:
+            raise InvalidValue(
+                f"report = True: needs {', '.join(missing)}; pip install 'aframe-heave[report]', or pass --no-report"
+            )
+
+
+def main() -> int:
+    """Run the command."""
+    with user_errors():
+        options, console = parse(Options, "train.evaluate", __doc__ or ""), Console()
+        choices = choose_all(options.policies)
+        opened = open_run(options, "train.evaluate")
+        opened.record(options)
+        folder = opened.folder
+        try:
+            comparison = run_all(choices, options, console)
+            write(folder, comparison, console)
+            if options.report:
+                # Imported late: they need the extra.
+                from train.evaluate.episode_table import write_episodes
+                from train.evaluate.report.html import write_report
+
+                write_episodes(folder / "episodes.parquet", comparison)
+                console.print(f"every episode: {folder / 'episodes.parquet'}")
+                with console.status("writing the report"):
+                    write_report(folder / "report.html", comparison, opened.command)
+                console.print(f"report: {folder / 'report.html'}")
+        except KeyboardInterrupt:
+            console.print("interrupted: the comparison is not complete")
+            return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Learners, and what their commands do around them."""

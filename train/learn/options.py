@@ -1,0 +1,75 @@
+"""Options that all learners share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+from aframe_env.validation import require_choice, require_integer, require_number
+from train.shared.run_folder import RunOptions
+
+EPISODE_DURATION: Final = 60.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class LearningOptions(RunOptions):
+    """Options that all learners share."""
+
+    timesteps: int = 1_000_000
+    """Control steps to learn from, over all rows."""
+    n_envs: int = 64
+    """Rows of the environment."""
+    seed: int = 0
+    """Seeds everything; the same seed gives the same agent."""
+    seeds: int = 1
+    """Train so many agents, with seeds one after another, each in a folder of its own."""
+    observation: Literal["state", "sensors"] = "state"
+    """What the agent sees."""
+    control_period: float = 0.1
+    """Control step, s."""
+    batch_size: int = 1024
+    """Minibatch."""
+    learning_rate: float = 1e-3
+    """At the start; it falls linearly to a thirtieth."""
+    gamma: float = 0.95
+    """Discount for a control step: a horizon of two seconds."""
+    hidden: int = 64
+    """Units of each hidden layer."""
+    horizon: float = 30.0
+    """Rows start a new scenario after this time, s."""
+    drift_limit: float = 10.0
+    """Depth error at which a row starts anew, m; its last state's value stands for the rest."""
+    reward_scale: float = 1.0
+    """Reward for a metre of root mean square depth error over a step."""
+    reward_knee: float = 0.05
+    """Depth error beyond which the reward falls with its logarithm only, m: what is learned would otherwise be spent on
+    the few loads that drift far off, not on the last centimetres of all others."""
+    eval_scenarios: int = 200
+    """Held-out scenarios of the comparison at the end; 0 leaves it out."""
+    eval_privileged: int = 20
+    """The first so many of them, or all if there are fewer, for the drives that are optimised with the whole future
+    known."""
+    threads: int = 1
+    """Threads of torch; more than one only slows so small a network down."""
+
+    def __post_init__(self) -> None:
+        require_integer("timesteps", self.timesteps, low=1, high=10**12)
+        require_integer("n_envs", self.n_envs, low=1, high=2**20)
+        require_integer("seed", self.seed, low=0, high=2**32 - 1)
+        require_integer("seeds", self.seeds, low=1, high=10_000)
+        require_choice("observation", self.observation, ("state", "sensors"))
+        require_number("control_period", self.control_period, "s", low=0.01, high=2.0)
+        require_integer("batch_size", self.batch_size, low=2, high=10**9)
+        require_number("learning_rate", self.learning_rate, "", low=0.0, high=1.0, low_open=True)
+        require_number("gamma", self.gamma, "", low=0.0, high=1.0)
+        require_integer("hidden", self.hidden, low=1, high=4096)
+        require_number("horizon", self.horizon, "s", low=self.control_period, high=EPISODE_DURATION)
+        require_number("drift_limit", self.drift_limit, "m", low=0.0, high=1e3, low_open=True)
+        require_number("reward_scale", self.reward_scale, "1/m", low=0.0, high=1e6, low_open=True)
+        require_integer("eval_scenarios", self.eval_scenarios, low=0, high=10**6)
+        require_integer("eval_privileged", self.eval_privileged, low=0, high=10**6)
+        require_integer("threads", self.threads, low=1, high=256)
+
+    def rate(self, remaining: float) -> float:
+        """Learning rate when a share ``remaining`` of the training is left."""
+        return self.learning_rate * max(remaining, 1.0 / 30.0)

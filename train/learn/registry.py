@@ -1,0 +1,26 @@
+"""Learners by name. A new one is a module with a ``SPEC``, a line here, and a door like ``train/ppo.py``."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Final
+
+from gymnasium.error import DependencyNotInstalled
+
+from train.learn.learner import LearnerSpec
+
+LEARNERS: Final = {
+    "ppo": "train.learn.ppo",
+    "ppo-rsl": "train.learn.ppo_rsl",
+    "sac": "train.learn.sac",
+}
+"""Module of each learner. One is imported when it is asked for, since some need an extra."""
+
+
+def find_learner(name: str) -> LearnerSpec:
+    """Return a learner by its name."""
+    try:
+        spec: LearnerSpec = import_module(LEARNERS[name]).SPEC
+    except ModuleNotFoundError as error:
+        raise DependencyNotInstalled(f'{error.name} is not installed: pip install "aframe-heave[cuda]"') from error
+    return spec

@@ -1,0 +1,57 @@
+"""How policies degrade when things are not what they were told: ``python -m train.sensitivity``.
+
+Load mass, rope length, E_R F_R, rope damping, period and phase of the waves, one at a time and all together. Writes
+sensitivity.json (curves and Sobol indices), one_at_a_time.png, sobol.png and notes.md into the output folder.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import asdict
+
+from rich.console import Console
+from rich.progress import Progress
+
+from agents.drives import map as drive_map
+from agents.drives.tuned import TUNED
+from train.sensitivity.figures import draw_curves, draw_indices
+from train.sensitivity.notes import notes
+from train.sensitivity.study import MAP, Job, Options, assumed_scenarios, still_rms, study
+from train.shared.cli import parse
+from train.shared.jobs import run_jobs
+from train.shared.run_folder import open_run, user_errors, write_json, write_text
+from train.shared.tuned_drives import tune
+
+
+def main() -> int:
+    """Run the command."""
+    with user_errors():
+        options, console = parse(Options, "train.sensitivity", __doc__ or ""), Console()
+        if MAP in options.policies:
+            drive_map.load(options.drive_map)
+        opened = open_run(options, "train.sensitivity")
+        folder = opened.folder
+        assumed = assumed_scenarios(options)
+        still = tuple(still_rms(assumed).tolist())
+        names = [name for name in options.policies if name in TUNED]
+        try:
+            with Progress(console=console) as bars:
+                tuned = tune(names, assumed, optimiser=options.optimiser, workers=options.workers, progress=bars)
+                jobs = [Job(name, tuple(tuned.get(name, ())), still, options) for name in options.policies]
+                studies = run_jobs(study, jobs, workers=options.workers, progress=bars, description="policies")
+        except KeyboardInterrupt:
+            console.print("interrupted: nothing was written")
+            return 130
+        write_json(folder / "sensitivity.json", [asdict(each) for each in studies])
+        opened.record(options, seed=options.seed)
+        draw_curves(folder / "one_at_a_time.png", studies)
+        draw_indices(folder / "sobol.png", studies)
+        text = notes(opened.command, options.scenarios, studies)
+        write_text(folder / "notes.md", text)
+        console.print(text, soft_wrap=True, markup=False)
+        console.print(f"written: {folder}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,113 @@
+"""One policy's share of a sensitivity study: what a worker process computes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from aframe_env.scenario import Scenario, ScenarioDistribution
+from aframe_env.validation import InvalidValue, require_choice, require_integer
+from agents.drives import map as drive_map
+from agents.drives.map_policy import DriveMapPolicy
+from agents.drives.optimisation import OPTIMISERS, OptimisedDrive, Optimiser
+from agents.drives.policy import DrivePolicy
+from agents.drives.tuned import TUNED
+from agents.policy import DrumStill, FloatArray, Knowledge, Policy
+from agents.registry import BuildContext, choose
+from agents.rollout import held_out_scenarios, run
+from train.sensitivity.analysis import Sensitivity, analyse
+from train.shared.run_folder import RunOptions
+from train.shared.tuned_drives import DURATION
+
+STILL, MAP = "drum still", "drive map"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options(RunOptions):
+    """Which policies, in how many scenarios."""
+
+    policies: tuple[str, ...] = (
+        STILL,
+        *TUNED,
+        MAP,
+        "feed-forward + feedback",
+        "results/agents/ppo",
+        "results/agents/sac",
+        "results/agents/ppo-sensors",
+        "results/agents/sac-sensors",
+    )
+    """"drum still", "S-Ω1", "S-Ω2", "H-Ω1", "H-Ω2", "drive map", or the folder of an agent."""
+    scenarios: int = 8
+    """Held-out random seas that are assumed."""
+    points: int = 9
+    """Values of each factor, one at a time."""
+    samples: int = 128
+    """Base samples of the Sobol indices, a power of two: 8 times as many combinations, in every assumed scenario."""
+    drive_map: Path = Path("results/drive-map")
+    """Folder of the drive map."""
+    optimiser: Optimiser = "nelder-mead"
+    """What tunes the drives for Ω1."""
+    seed: int = 0
+    """Draws the Sobol samples."""
+    workers: int | None = None
+    """Worker processes; by default one for each core."""
+
+    def __post_init__(self) -> None:
+        if not self.policies or len(set(self.policies)) < len(self.policies):
+            raise InvalidValue(f"policies = {self.policies}: must be at least one, each named once")
+        require_integer("scenarios", self.scenarios, low=1, high=10_000)
+        require_integer("points", self.points, low=2, high=1001)
+        require_integer("samples", self.samples, low=2, high=2**20)
+        if self.samples & (self.samples - 1):
+            raise InvalidValue(f"samples = {self.samples}: must be a power of two in [2, 1048576]")
+        require_choice("optimiser", self.optimiser, OPTIMISERS)
+        require_integer("seed", self.seed, low=0, high=2**32 - 1)
+        for name in self.policies:
+            if name not in (STILL, MAP, *TUNED) and choose(name).for_each_scenario:
+                raise InvalidValue(f"policies: {name!r}: is optimised for each scenario as S-Ω1 and its like are here")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One policy's share of the study."""
+
+    name: str
+    drives: tuple[OptimisedDrive, ...]
+    """Tuned for the assumed scenarios, if the policy follows such."""
+    still: tuple[float, ...]
+    """RMS depth error with the drum still in the assumed scenarios, m."""
+    options: Options
+
+
+def _policy(job: Job) -> Policy:
+    if job.name == STILL:
+        return DrumStill()
+    if job.name == MAP:
+        return DriveMapPolicy(drive_map.load(job.options.drive_map), None)
+    if job.name in TUNED:
+        return DrivePolicy(job.name, job.drives, Knowledge.FUTURE)
+    scenarios = assumed_scenarios(job.options)
+    setting = BuildContext(
+        scenarios=scenarios, nominal=ScenarioDistribution().nominal(), episode_duration=DURATION, observation="state"
+    )
+    return choose(job.name).build(setting)
+
+
+def study(job: Job) -> Sensitivity:
+    """Everything about one policy."""
+    options = job.options
+    assumed = assumed_scenarios(options)
+    return analyse(_policy(job), assumed, np.array(job.still), options.points, options.samples, options.seed)
+
+
+def assumed_scenarios(options: Options) -> list[Scenario]:
+    """What the policies are told."""
+    return held_out_scenarios(ScenarioDistribution(), options.scenarios)
+
+
+def still_rms(assumed: Sequence[Scenario]) -> FloatArray:
+    """RMS depth error [m] with the drum still in each assumed scenario."""
+    return run(DrumStill(), assumed).rms

@@ -1,0 +1,65 @@
+"""Options of the commands: typed dataclasses, from the command line by tyro, from TOML by ``--config``."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import tomli_w
+import tyro
+from cattrs import Converter
+
+from aframe_env.serialization import strict_converter, structure, without_none
+from aframe_env.validation import InvalidValue
+
+T = TypeVar("T")
+
+
+def read_toml(path: Path, kind: type[T]) -> T:
+    """Options from a TOML file; keys that the command does not know are refused."""
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidValue(f"config = {str(path)!r}: cannot be read: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InvalidValue(f"{path}: not TOML: {error}") from error
+    return structure(_converter(), data, kind, str(path))
+
+
+def to_toml(options: Any) -> str:
+    """Options as TOML; what is not set is left out."""
+    return tomli_w.dumps(without_none(_converter().unstructure(options)))
+
+
+def _converter() -> Converter:
+    converter = strict_converter()
+    converter.register_structure_hook(Path, lambda value, _: Path(value))
+    converter.register_unstructure_hook(Path, str)
+    return converter
+
+
+def parse(kind: type[T], command: str, description: str, args: Sequence[str] | None = None) -> T:
+    """Options from the command line; ``--config FILE.toml`` gives the defaults that the rest overrides.
+
+    ``command`` is the command's name, as in "train.drives".
+    """
+    args = list(sys.argv[1:] if args is None else args)
+    default: T | None = None
+    for index, arg in enumerate(args):
+        name, _, value = arg.partition("=")
+        if name == "--config":
+            if not value and index + 1 >= len(args):
+                raise InvalidValue("--config needs a file")
+            default = read_toml(Path(value or args[index + 1]), kind)
+            del args[index : index + (1 if value else 2)]
+            break
+    epilog = description + "\n\n--config FILE.toml reads the options from a file; the rest overrides it."
+    prog = f"python -m {command}"
+    return (
+        tyro.cli(kind, prog=prog, args=args, description=epilog, default=default)
+        if default
+        else tyro.cli(kind, prog=prog, args=args, description=epilog)
+    )

@@ -1,0 +1,127 @@
+"""Run folders and output files: nothing is overwritten unasked, nothing is left half-written."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import platform
+import shlex
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from gymnasium.error import DependencyNotInstalled
+from llvmlite.binding import get_host_cpu_name
+
+from aframe_env.validation import InvalidValue
+from train.shared.cli import to_toml
+
+REPORTED_PACKAGES = ("gymnasium", "stable-baselines3", "torch", "numpy", "scipy", "numba", "waveresponse")
+
+
+def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
+    """Let ``write`` fill a temporary file beside ``path``, then rename it: all or nothing."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        write(temporary)
+        temporary.chmod(0o644)
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, all or nothing."""
+    write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
+
+
+def write_json(path: Path, data: Any) -> None:
+    """Write a JSON file, all or nothing; NaN is refused."""
+    write_text(path, json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def new_folder(path: Path, *, overwrite: bool = False) -> Path:
+    """Make an output folder; an existing one with something in it is refused unless ``overwrite``."""
+    if path.exists() and not path.is_dir():
+        raise InvalidValue(f"out = {str(path)!r}: is a file, must be a folder")
+    if path.is_dir() and any(path.iterdir()) and not overwrite:
+        raise InvalidValue(f"out = {str(path)!r}: exists and is not empty; choose another, or pass --overwrite")
+    path.mkdir(parents=True, exist_ok=True)
+    return path
+
+
+def new_file(path: Path, *, overwrite: bool = False) -> Path:
+    """Return the path of an output file; one that exists is refused unless ``overwrite``."""
+    if path.is_dir():
+        raise InvalidValue(f"out = {str(path)!r}: is a folder, must be a file")
+    if path.exists() and not overwrite:
+        raise InvalidValue(f"out = {str(path)!r}: exists; choose another, or pass --overwrite")
+    return path
+
+
+def versions() -> dict[str, str]:
+    """Versions of what a result depends on, to the last digit."""
+    return {
+        "aframe-heave": version("aframe-heave"),
+        "python": platform.python_version(),
+        "processor": get_host_cpu_name(),
+        **{name: version(name) for name in REPORTED_PACKAGES},
+    }
+
+
+def command_line(name: str) -> str:
+    """Return the command line that is running; ``name`` is the command's, as in "train.drives"."""
+    return shlex.join(["python", "-m", name, *sys.argv[1:]])
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """Where a command writes."""
+
+    out: Path | None = None
+    """Output folder; by default runs/COMMAND-DATE-TIME."""
+    overwrite: bool = False
+    """Write into the output folder even if it has something in it."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run of a command, and the folder that it fills."""
+
+    folder: Path
+    command: str
+    """The command line that made it."""
+
+    def record(self, options: RunOptions, **more: Any) -> None:
+        """Write config.toml, which ``--config`` reads, and run.json: the command line, ``more``, and the versions."""
+        write_text(self.folder / "config.toml", to_toml(options))
+        write_json(self.folder / "run.json", {"command": self.command, **more, "versions": versions()})
+
+
+def open_run(options: RunOptions, name: str) -> Run:
+    """Make the folder of a run of ``python -m NAME``."""
+    default = Path("runs") / f"{name.rpartition('.')[2].replace('_', '-')}-{datetime.now():%Y%m%d-%H%M%S}"
+    return Run(new_folder(options.out or default, overwrite=options.overwrite), command_line(name))
+
+
+@contextlib.contextmanager
+def user_errors() -> Iterator[None]:
+    """One line on standard error for bad input, a failing disk and a missing extra (status 2) and Ctrl-C (130)."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        raise SystemExit(130) from None
+    except (InvalidValue, OSError, DependencyNotInstalled) as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise SystemExit(2) from None

@@ -1,0 +1,168 @@
+"""Verification of the full model: ``python -m train.verify``.
+
+Without a file it runs every check against closed forms and independent programs and writes a table
+(README.md, verification.json) and pictures into ``--folder``, default runs/verify-DATE-TIME. The exit status
+is 1 if a bar does not hold. With a file it runs that one case and prints its result as JSON, or writes it
+into the file that ``--out`` names:
+
+    python -m train.verify --load-case case.toml
+    python -m train.verify --release case.toml --out release.json
+    python -m train.verify --dynamic case.toml --out run.json
+
+A static case's JSON has the keys of the reference data's cases (aframe_env/data/reference/static.json) and,
+under ``along``, section forces and von Mises stress along the frame. In ``sec_before_…`` and ``sec_after_…``
+the moments are those at the point; N, Vy, Vz and T are means over the adjoining 0.1 m, as in the reference
+program. The other two kinds have one list a column, with the column names of the reference data's CSV files.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy
+
+from aframe_env.validation import InvalidValue
+from train.shared.cli import parse
+from train.shared.run_folder import RunOptions, new_file, open_run, user_errors, write_json, write_text
+from train.verify import frame_checks, run_checks
+from train.verify.cases import (
+    FORMAT,
+    dynamic_case,
+    read_toml,
+    release_case,
+    static_case,
+    without_nan,
+)
+from train.verify.pictures import draw_all
+from train.verify.report import Check, markdown
+
+__doc__ = f"{__doc__}\n{FORMAT}"
+
+CASE_KINDS: Mapping[str, Callable[[Mapping[str, Any], Path], dict[str, object]]] = {
+    "load_case": lambda data, _: static_case(data),
+    "release": lambda data, _: release_case(data),
+    "dynamic": dynamic_case,
+}
+"""What runs a case, given what its file says and the file's folder."""
+
+
+def run_all(*, say: bool = True) -> list[Check]:
+    """Every check, in the order of the table."""
+    checks: list[Check] = []
+    for check in (
+        frame_checks.beam_frequencies,
+        frame_checks.determinate_reactions,
+        frame_checks.static_frame,
+        frame_checks.natural_modes,
+        frame_checks.previous_model,
+        run_checks.releases,
+        run_checks.paper_case,
+        run_checks.stiff_frame,
+        run_checks.energy,
+        run_checks.steps,
+        run_checks.drift,
+    ):
+        begin = time.perf_counter()
+        found = check()
+        found = [found] if isinstance(found, Check) else found
+        checks += found
+        if say:
+            for item in found:
+                mark = "ok  " if item.passed else "FAIL"
+                print(f"{mark} {item.name}: {item.measured} (bar: {item.bar})", flush=True)
+            print(f"     {time.perf_counter() - begin:.1f} s", flush=True)
+    return checks
+
+
+def versions() -> dict[str, str]:
+    """Of what the figures depend on."""
+    return {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
+
+
+def write_report(checks: Sequence[Check], folder: Path) -> None:
+    """Table as Markdown and JSON, and the pictures."""
+    pictures = draw_all(folder)
+    stated = ", ".join(f"{name} {version}" for name, version in versions().items())
+    images = "\n\n".join(f"![{path.stem.replace('_', ' ')}]({path.name})" for path in pictures)
+    footer = f"{images}\n\nMade by `python -m train.verify` ({stated})."
+    write_text(folder / "README.md", markdown(checks, "Verification of the full model", footer))
+    write_json(
+        folder / "verification.json",
+        {
+            "command": "python -m train.verify",
+            "versions": versions(),
+            "checks": [
+                {**asdict(check), "passed": bool(check.passed), "rows": [asdict(row) for row in check.rows]}
+                for check in checks
+            ],
+        },
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """All checks, or one case."""
+
+    load_case: Path | None = None
+    """Run one static load case, from a TOML file."""
+    release: Path | None = None
+    """Run one release of a static load, from a TOML file."""
+    dynamic: Path | None = None
+    """Run one case with ship motion, from a TOML file."""
+    out: Path | None = None
+    """Where that case's result goes, a JSON file; by default it is printed."""
+    folder: Path | None = None
+    """Where table and pictures of all checks go; by default runs/verify-DATE-TIME."""
+    overwrite: bool = False
+    """Write even where there is something."""
+
+    def __post_init__(self) -> None:
+        if len(self.cases) > 1:
+            raise InvalidValue(f"{', '.join(self.cases)}: give one of them")
+        if self.cases and self.folder is not None:
+            raise InvalidValue("--folder goes without --load-case, --release and --dynamic: name a file by --out")
+        if self.out is not None and not self.cases:
+            raise InvalidValue("--out goes with --load-case, --release or --dynamic")
+
+    @property
+    def cases(self) -> dict[str, Path]:
+        """Files of the cases that are asked for."""
+        given = {name: getattr(self, name) for name in CASE_KINDS}
+        return {name: path for name, path in given.items() if path is not None}
+
+
+def run_case(kind: str, path: Path, options: Options) -> None:
+    """Run one case, and write or print its result."""
+    out = None if options.out is None else new_file(options.out, overwrite=options.overwrite)
+    result = without_nan(CASE_KINDS[kind](read_toml(path), path.parent))
+    if out is None:
+        print(json.dumps(result, indent=2, allow_nan=False))
+    else:
+        write_json(out, result)
+        print(f"result: {out}")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit status."""
+    with user_errors():
+        options = parse(Options, "train.verify", __doc__ or "", arguments)
+        for kind, path in options.cases.items():
+            run_case(kind, path, options)
+            return 0
+        run = open_run(RunOptions(out=options.folder, overwrite=options.overwrite), "train.verify")
+        checks = run_all()
+        write_report(checks, run.folder)
+        print(f"written: {run.folder}")
+        return 0 if all(check.passed for check in checks) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

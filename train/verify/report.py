@@ -1,0 +1,44 @@
+"""What a check found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from train.shared.markdown import table
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One figure beside its reference."""
+
+    quantity: str
+    measured: str
+    reference: str
+    error: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """One check: the bar, what was measured, and whether it holds."""
+
+    name: str
+    bar: str
+    measured: str
+    passed: bool
+    rows: Sequence[Row] = field(default_factory=tuple)
+    note: str = ""
+    """What a reader may ask about the rows."""
+
+
+def markdown(checks: Sequence[Check], heading: str, footer: str) -> str:
+    """Summary table, then the figures of every check beside their references."""
+    found = [(c.name, c.bar, c.measured, "yes" if c.passed else "**no**") for c in checks]
+    parts = [f"# {heading}\n", table(("check", "bar", "measured", "holds"), found)]
+    for check in checks:
+        if check.rows:
+            figures = [(r.quantity, r.measured, r.reference, r.error) for r in check.rows]
+            parts += [f"## {check.name}\n", table(("figure", "here", "reference", "error"), figures)]
+        if check.note:
+            parts.append(f"{check.note}\n")
+    return "\n".join([*parts, f"{footer}\n"])
