@@ -14,7 +14,7 @@ from aframe_env import Crane, Frame, Harmonic, RecordedMotion, Rope, Scenario, S
 from aframe_env.scenario.cross_sections import FrameStructure, Material, Servomotor
 from aframe_env.scenario.file import _SECTIONS, _Recorded, _SeaMotion
 
-PAGE = (Path(__file__).parents[1] / "docs" / "scenario-files.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "scenario-files.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```(\w+)\n(.*?)```", PAGE, flags=re.DOTALL)
 TABLES = {
     Scenario: "## Top level",

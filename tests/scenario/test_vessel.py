@@ -13,7 +13,7 @@ from aframe_env.scenario.sea import Sea, SeaMotion
 from aframe_env.scenario.vessel import COLUMNS, Vessel
 from aframe_env.validation import InvalidValue
 
-MSS = Path(__file__).parent / "data" / "mss_supply_motion_rao.csv"
+MSS = Path(__file__).parents[1] / "data" / "mss_supply_motion_rao.csv"
 SUPPLY = Vessel.supply()
 
 
