@@ -1,8 +1,9 @@
+from .config import TaskConfig
 from .scenario.crane import Crane, Frame, Rope, Winch
 from .scenario.distribution import ScenarioDistribution
-from .scenario.file import read_scenario, scenario_text
+from .scenario.file import read_scenario, read_scenarios, scenario_text
 from .scenario.motion import Harmonic, HarmonicMotion
-from .scenario.recorded_motion import RecordedMotion
+from .scenario.recorded_motion import RecordedMotion, RecordedWindow
 from .scenario.scenario import Scenario
 from .scenario.sea import Sea, SeaMotion
 from .scenario.sensors import Channel, Sensors
@@ -20,6 +21,7 @@ __all__ = [
     "HarmonicMotion",
     "InvalidValue",
     "RecordedMotion",
+    "RecordedWindow",
     "Rope",
     "Scenario",
     "ScenarioDistribution",
@@ -27,8 +29,10 @@ __all__ = [
     "SeaMotion",
     "Sensors",
     "SmallRotationWarning",
+    "TaskConfig",
     "Vessel",
     "Winch",
     "read_scenario",
+    "read_scenarios",
     "scenario_text",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -48,6 +49,47 @@ def timing(scenario: Scenario, control_period: float, max_inner_step: float | No
     return Timing(segments, segment, inner_steps(segment, longest))
 
 
+class RecordTable:
+    """Lines of the recorded motions that rows follow: deck coordinates, rates and accelerations, (lines, 18)."""
+
+    def __init__(self) -> None:
+        self.lines = np.zeros((0, 18))
+        """Used lines, and free ones in between."""
+        self._places: dict[TabledMotion, tuple[int, int]] = {}
+
+    def place(self, motion: TabledMotion, period: float, followed: Callable[[], set[float]]) -> tuple[int, int]:
+        """First line and length of a motion on a grid of ``period`` s, which is added to the table when new.
+
+        ``followed`` gives the first lines that rows still follow: what no row follows makes room for what comes.
+        """
+        if motion in self._places:
+            return self._places[motion]
+        table = motion.table(period)
+        first = self._gap(len(table))
+        if first is None:
+            live = followed()
+            self._places = {each: place for each, place in self._places.items() if place[0] in live}
+            first = self._gap(len(table))
+        if first is None:
+            first = max((begin + length for begin, length in self._places.values()), default=0)
+            # Doubled, so that the lines are copied only so often.
+            grown = np.zeros((max(first + len(table), 2 * len(self.lines)), 18))
+            grown[: len(self.lines)] = self.lines
+            self.lines = grown
+        self.lines[first : first + len(table)] = table
+        self._places[motion] = first, len(table)
+        return self._places[motion]
+
+    def _gap(self, size: int) -> int | None:
+        """First line of a gap of ``size`` lines."""
+        end = 0
+        for begin, length in sorted(self._places.values()):
+            if begin - end >= size:
+                return end
+            end = begin + length
+        return end if len(self.lines) - end >= size else None
+
+
 class Engine:
     """Rows of the simplified model side by side, each with its own scenario.
 
@@ -75,8 +117,7 @@ class Engine:
         self._step = self._kernels.step if rows <= at.LANES else self._kernels.step_parallel
         self._components = at.padded(components)
         self._blocks = np.zeros((-(-rows // self._lanes), at.slots(self._components) * self._lanes))
-        self._records = np.zeros((0, 18))
-        self._known_records: dict[TabledMotion, tuple[int, int]] = {}
+        self._records = RecordTable()
         # Lanes beyond the last row hold the paper's case, so that no lane computes with zeros for parameters.
         idle = self.row_vector(Scenario.paper())
         self._fill(idle)
@@ -113,7 +154,7 @@ class Engine:
     @property
     def records(self) -> FloatArray:
         """Recorded motions that rows follow: lines of deck coordinates, rates and accelerations, (lines, 18)."""
-        return self._records
+        return self._records.lines
 
     def step(self, commands: FloatArray) -> None:
         """Advance every row by one control step with the drum speed commands (rows,) rad/s."""
@@ -165,9 +206,9 @@ class Engine:
         row[at.RECORD], row[at.RECORD_LENGTH] = record, record_length
         row[at.NODE_SEGMENTS] = segments
         component_kernels().write(row, components.frequency, components.response, segments * times.segment)
-        self._kernels_of_one.start(row[None], self._components, self._records)
+        self._kernels_of_one.start(row[None], self._components, self._records.lines)
         hang_load(row, 1, 0, scenario.initial == "comoving")
-        self._kernels_of_one.start(row[None], self._components, self._records)
+        self._kernels_of_one.start(row[None], self._components, self._records.lines)
         return row
 
     def _fill(self, vector: FloatArray) -> None:
@@ -175,7 +216,7 @@ class Engine:
         self._view[...] = vector[None, :, None]
 
     def _advance(self) -> None:
-        self._step(self._blocks, self._components, self._segments, self._records)
+        self._step(self._blocks, self._components, self._segments, self._records.lines)
 
     def _timing(self, scenario: Scenario) -> Timing:
         return timing(scenario, self.control_period, self._max_inner_step)
@@ -210,13 +251,7 @@ class Engine:
 
     def _record(self, motion: TabledMotion, segment: float) -> tuple[int, int]:
         """First line and length of a recorded motion in the table of records, which it is added to when new."""
-        known = self._known_records.get(motion)
-        if known is None:
-            table = motion.table(segment)
-            known = (len(self._records), len(table))
-            self._records = np.concatenate([self._records, table])
-            self._known_records[motion] = known
-        return known
+        return self._records.place(motion, segment, lambda: set(self._view[:, at.RECORD].ravel().tolist()))
 
     def _make_room(self, components: int) -> None:
         """Widen the rows when a motion has more components than there is room for."""

@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env import task
+from aframe_env.config import TaskConfig
 from aframe_env.rendering import open_renderer
-from aframe_env.scenario import Scenario, ScenarioSource
+from aframe_env.scenario import Scenario
 from aframe_env.simulation import RowState, Simulation
 from aframe_env.validation import InvalidValue, require_choice, require_numbers
 
@@ -107,14 +108,15 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     `SmallRotationWarning` with the figure.
 
     ## Arguments
-    All by keyword, as in `gymnasium.make("AFrameHeave-v0", control_period=0.2)`:
+    By keyword, as in `gymnasium.make("AFrameHeave-v0", control_period=0.2)`, or together as `config=TaskConfig(...)`:
 
     - `model`: "simplified" or "rfem".
     - `rfes`: with "rfem", elements of a leg and of the top beam (default `(10, 8)`; the beam's even).
     - `rfem_modes`: with "rfem", how many natural modes to keep beside nine static shapes; None (default): all. With 5
       the load moves as with all to 1e-9, reactions to 1e-3 of their range, in seas that build up over some seconds.
-    - `scenario`: a `Scenario` for every episode, or the `ScenarioDistribution` to draw from. Default: Hs 0.5-4 m,
-      Tp 6-14 s, any heading, load 20-100 t, rope 50-1500 m.
+    - `scenario`: a `Scenario` for every episode, or the `ScenarioDistribution` to draw from; or either as a TOML file,
+      or as a mapping of what such a file says. Default: Hs 0.5-4 m, Tp 6-14 s, any heading, load 20-100 t, rope
+      50-1500 m.
     - `control_period`: 0.001 to 2 s (default 0.1).
     - `episode_duration`: s (default 60).
     - `observation`: "state", "sensors", or a `Sensors`.
@@ -130,32 +132,10 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
         "render_fps": 10,
     }
 
-    def __init__(
-        self,
-        *,
-        model: str = "simplified",
-        scenario: ScenarioSource | None = None,
-        control_period: float = 0.1,
-        episode_duration: float = 60.0,
-        observation: task.Observation = "state",
-        max_inner_step: float | None = None,
-        rfes: tuple[int, int] | None = None,
-        rfem_modes: int | None = None,
-        render_mode: str | None = None,
-    ) -> None:
+    def __init__(self, config: TaskConfig | None = None, *, render_mode: str | None = None, **arguments: Any) -> None:
         if render_mode is not None:
             require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
-        self._simulation = Simulation(
-            1,
-            model=model,
-            scenario=scenario,
-            control_period=control_period,
-            episode_duration=episode_duration,
-            observation=observation,
-            max_inner_step=max_inner_step,
-            rfes=rfes,
-            rfem_modes=rfem_modes,
-        )
+        self._simulation = Simulation(1, (config or TaskConfig()).replaced(arguments))
         self.observation_space = self._simulation.observation_space  # type: ignore[assignment]
         self.action_space = self._simulation.action_space
         self.render_mode = render_mode
@@ -193,7 +173,7 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
         drawn = self._simulation.draw(self.np_random, _scenario_option(options))
         self._simulation.reset_rows(_ROW, [drawn])
         self._draw()
-        return self._simulation.observe()[0], self._info(self._simulation.results[0].tolist())
+        return self._simulation.observe()[0], self._info()
 
     def step(
         self, action: npt.NDArray[np.float32]
@@ -210,14 +190,13 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
             raise InvalidValue(f"action = {action!r} rad/s: must be finite, in [{-limit:g}, {limit:g}]")
         simulation.advance(command)
         self._draw()
-        results = simulation.results[0].tolist()
         truncated = bool(simulation.steps[0] >= simulation.episode_steps)
         return (
             simulation.observe()[0],
-            -results[task.COST],
-            results[task.PARTED] > 0.0,
+            -float(simulation.results[0, task.COST]),
+            bool(simulation.results[0, task.PARTED] > 0.0),
             truncated,
-            self._info(results),
+            self._info(),
         )
 
     def get_state(self) -> EnvState:
@@ -261,19 +240,9 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
             self._renderer = open_renderer(self._simulation)
         return self._renderer
 
-    def _info(self, results: list[float]) -> dict[str, Any]:
-        info = {
-            "time": results[task.TIME],
-            "load_position": np.array(results[task.LOAD : task.LOAD + 3]),
-            "rope_tension": results[task.TENSION],
-            "slack": results[task.SLACK] > 0.0,
-            "omega1": results[task.OMEGA1],
-            "omega2": results[task.OMEGA2],
-        }
-        frames = self._simulation.frames()
-        if frames is not None:
-            info |= {key: value[0] for key, value in task.frame_info(frames).items()}
-        return info
+    def _info(self) -> dict[str, Any]:
+        found = task.info(self._simulation.results.copy(), self._simulation.frames())
+        return {name: value[0] if value.ndim > 1 else value[0].item() for name, value in found.items()}
 
 
 def _scenario_option(options: dict[str, Any] | None) -> Any:

@@ -132,7 +132,7 @@ class FlexibleEngine(Engine):
     def _advance(self) -> None:
         kernels = self._flexible_kernels
         step = kernels.step if self.rows <= at.LANES else kernels.step_parallel
-        step(self._blocks, self._frames, self._tables, self._components, self._segments, self._records)
+        step(self._blocks, self._frames, self._tables, self._components, self._segments, self._records.lines)
 
     def _adopt(self, vector: FloatArray, scenario: Scenario) -> FloatArray:
         adopted = np.concatenate([vector[: self._slots], super()._adopt(vector[self._slots :], scenario)])

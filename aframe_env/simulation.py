@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,19 +10,18 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from aframe_env import task
+from aframe_env.config import TaskConfig
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.flexible.readout import ROTATION
 from aframe_env.engine import Engine
-from aframe_env.flexible_engine import FlexibleEngine, Mesh, mesh_of
+from aframe_env.flexible_engine import FlexibleEngine, Mesh
 from aframe_env.rfem.model import warn_of_rotation
-from aframe_env.scenario import Scenario, ScenarioDistribution, ScenarioSource
+from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.scenario.motion import require_coverage
-from aframe_env.scenario.sensors import SensorBank, Sensors
-from aframe_env.validation import InvalidValue, require_choice, require_number
+from aframe_env.scenario.sensors import SensorBank
+from aframe_env.validation import InvalidValue
 
 FloatArray = npt.NDArray[np.float64]
-
-MODELS = ("simplified", "rfem")
 
 
 @dataclass(frozen=True)
@@ -41,45 +39,20 @@ class RowState:
 class Simulation:
     """``rows`` independent episodes of one task."""
 
-    def __init__(
-        self,
-        rows: int,
-        *,
-        model: str = "simplified",
-        scenario: ScenarioSource | None = None,
-        control_period: float = 0.1,
-        episode_duration: float = 60.0,
-        observation: task.Observation = "state",
-        max_inner_step: float | None = None,
-        rfes: tuple[int, int] | None = None,
-        rfem_modes: int | None = None,
-    ) -> None:
-        """Validate the arguments of the environments (see ``AFrameHeaveEnv``) and make room for the rows."""
-        require_choice("model", model, MODELS)
-        require_number("control_period", control_period, "s", low=1e-3, high=2.0)
-        require_number("episode_duration", episode_duration, "s", low=control_period, high=1e6)
-        if not isinstance(observation, Sensors):
-            require_choice("observation", observation, ("state", "sensors"))
-        self.source: ScenarioSource = ScenarioDistribution() if scenario is None else scenario
-        if not isinstance(self.source, Scenario | ScenarioDistribution):
-            raise InvalidValue(f"scenario = {scenario!r}: must be a Scenario or a ScenarioDistribution")
+    def __init__(self, rows: int, config: TaskConfig | None = None) -> None:
+        """Make room for the rows."""
+        self.config = config = config or TaskConfig()
+        self.source: ScenarioSource = config.source
         self.rows = rows
-        self.control_period = float(control_period)
-        self.episode_steps = max(1, math.ceil(episode_duration / control_period - 1e-9))
-        self.episode_duration = self.episode_steps * self.control_period
-        self._mesh = mesh_of(model, rfes, rfem_modes)
-        if self._mesh is None:
-            self._engine = Engine(rows, control_period, max_inner_step=max_inner_step)
+        self.control_period = float(config.control_period)
+        self.episode_steps, self.episode_duration = config.steps, config.duration
+        if config.mesh is None:
+            self._engine = Engine(rows, self.control_period, max_inner_step=config.max_inner_step)
         else:
-            self._engine = FlexibleEngine(rows, control_period, self._mesh, max_inner_step=max_inner_step)
+            self._engine = FlexibleEngine(rows, self.control_period, config.mesh, max_inner_step=config.max_inner_step)
         self._report = task.report_kernel(self._engine.lanes)
-        sensors = Sensors() if observation == "sensors" else observation
-        self.sensors = sensors if isinstance(sensors, Sensors) else None
-        """None where the full state is observed."""
-        self._bank = SensorBank(self.sensors, rows, control_period) if self.sensors else None
-        quantities = task.STATE if self._bank is None else task.SENSED
-        self.quantities = quantities
-        self.observation_space = task.box(quantities)
+        self._bank = SensorBank(config.sensors, rows, self.control_period) if config.sensors else None
+        self.observation_space = task.box(config.quantities)
         self._low, self._high = self.observation_space.low, self.observation_space.high
         limit = np.float32(self.source.crane.winch.max_speed)
         self.action_space = spaces.Box(-limit, limit, (1,), np.float32)
@@ -160,13 +133,13 @@ class Simulation:
         if scenario is None:
             raise InvalidValue("get_state() before the first reset()")
         sensors = None if self._bank is None else self._bank.copy_row(index)
-        return RowState(scenario, self._engine.copy_row(index), sensors, int(self.steps[index]), self._mesh)
+        return RowState(scenario, self._engine.copy_row(index), sensors, int(self.steps[index]), self.config.mesh)
 
     def write_row(self, index: int, state: RowState) -> None:
         """Put back what ``copy_row`` returned."""
         if (state.sensors is None) != (self._bank is None):
             raise InvalidValue("set_state(): the state belongs to an environment with another observation")
-        if state.mesh != self._mesh:
+        if state.mesh != self.config.mesh:
             raise InvalidValue(
                 "set_state(): the state belongs to an environment with another model, rfes or rfem_modes"
             )

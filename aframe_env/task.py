@@ -17,6 +17,8 @@ from aframe_env.dynamics.compiling import kernel, scalar
 from aframe_env.dynamics.flexible import readout
 from aframe_env.scenario.sensors import CHANNELS, Sensors
 
+FloatArray = npt.NDArray[np.float64]
+
 Observation = Literal["state", "sensors"] | Sensors
 
 
@@ -47,6 +49,23 @@ STATE: Final = (
     Quantity("rope_length", "m", 0.0, 1e5),
 )
 """Observation "state". Order and ranges; a value beyond its range is clipped to it."""
+(
+    DEPTH_ERROR,
+    LOAD_VELOCITY_Z,
+    LOAD_OFFSET_X,
+    LOAD_OFFSET_Y,
+    LOAD_VELOCITY_X,
+    LOAD_VELOCITY_Y,
+    PULLEY_HEAVE,
+    PULLEY_VELOCITY_Z,
+    PULLEY_ACCELERATION_Z,
+    DRUM_ANGLE,
+    DRUM_SPEED,
+    ROPE_TENSION,
+    LOAD_MASS,
+    ROPE_LENGTH,
+) = range(len(STATE))
+# The columns of STATE, in its order.
 
 _RANGES: Final = {
     "heave": Quantity("pulley_heave", "m", -100.0, 100.0),
@@ -65,7 +84,7 @@ SENSED: Final = (
 )
 """Observation "sensors": the readings, and what the operator knows of the lift before it begins."""
 
-# What a step reports beside the observation, in double precision.
+# Columns of the results: what a step reports beside the observation, in double precision.
 TIME, LOAD, TENSION, SLACK, OMEGA1, OMEGA2, COST, PARTED = 0, 1, 4, 5, 6, 7, 8, 9
 RESULTS: Final = 10
 
@@ -136,20 +155,22 @@ def charge_parted(row: Any, episode_duration: float, lanes: int, j: int) -> None
 @scalar
 def read_out(row: Any, lanes: int, j: int, state: Any, results: Any, i: int) -> None:
     """Copy what is known of lane j into line i of state (N, 14) and results (N, RESULTS)."""
-    state[i, 0] = row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j]
-    state[i, 1] = row[(at.LOAD_VELOCITY + 2) * lanes + j]
-    state[i, 2] = row[at.LOAD_POSITION * lanes + j] - row[at.PULLEY * lanes + j]
-    state[i, 3] = row[(at.LOAD_POSITION + 1) * lanes + j] - row[(at.PULLEY + 1) * lanes + j]
-    state[i, 4] = row[at.LOAD_VELOCITY * lanes + j]
-    state[i, 5] = row[(at.LOAD_VELOCITY + 1) * lanes + j]
-    state[i, 6] = row[(at.PULLEY + 2) * lanes + j] - row[(at.PULLEY_ON_DECK + 2) * lanes + j]
-    state[i, 7] = row[(at.PULLEY + 5) * lanes + j]
-    state[i, 8] = row[(at.PULLEY + 8) * lanes + j]
-    state[i, 9] = row[at.DRUM_ANGLE * lanes + j]
-    state[i, 10] = row[at.DRUM_SPEED * lanes + j]
-    state[i, 11] = row[at.TENSION * lanes + j]
-    state[i, 12] = row[at.MASS * lanes + j]
-    state[i, 13] = row[at.FREE_LENGTH * lanes + j] + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
+    state[i, DEPTH_ERROR] = row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j]
+    state[i, LOAD_VELOCITY_Z] = row[(at.LOAD_VELOCITY + 2) * lanes + j]
+    state[i, LOAD_OFFSET_X] = row[at.LOAD_POSITION * lanes + j] - row[at.PULLEY * lanes + j]
+    state[i, LOAD_OFFSET_Y] = row[(at.LOAD_POSITION + 1) * lanes + j] - row[(at.PULLEY + 1) * lanes + j]
+    state[i, LOAD_VELOCITY_X] = row[at.LOAD_VELOCITY * lanes + j]
+    state[i, LOAD_VELOCITY_Y] = row[(at.LOAD_VELOCITY + 1) * lanes + j]
+    state[i, PULLEY_HEAVE] = row[(at.PULLEY + 2) * lanes + j] - row[(at.PULLEY_ON_DECK + 2) * lanes + j]
+    state[i, PULLEY_VELOCITY_Z] = row[(at.PULLEY + 5) * lanes + j]
+    state[i, PULLEY_ACCELERATION_Z] = row[(at.PULLEY + 8) * lanes + j]
+    state[i, DRUM_ANGLE] = row[at.DRUM_ANGLE * lanes + j]
+    state[i, DRUM_SPEED] = row[at.DRUM_SPEED * lanes + j]
+    state[i, ROPE_TENSION] = row[at.TENSION * lanes + j]
+    state[i, LOAD_MASS] = row[at.MASS * lanes + j]
+    state[i, ROPE_LENGTH] = (
+        row[at.FREE_LENGTH * lanes + j] + row[at.DRUM_RADIUS * lanes + j] * row[at.DRUM_ANGLE * lanes + j]
+    )
     results[i, TIME] = row[at.TIME * lanes + j]
     for k in range(3):
         results[i, LOAD + k] = row[(at.LOAD_POSITION + k) * lanes + j]
@@ -190,26 +211,39 @@ def clip(values: Any, low: Any, high: Any, observation: Any) -> None:
         clip_row(values, low, high, observation, i)
 
 
-def frame_info(frames: npt.NDArray[np.float64]) -> dict[str, Any]:
-    """What the information of an environment says of the frames, from their readout (rows, READOUTS)."""
-    return {
-        "pulley_deflection": frames[:, readout.DEFLECTION : readout.DEFLECTION + 3],
-        "foot_reactions": frames[:, readout.FEET : readout.FEET + 6].reshape(-1, 2, 3),
-        "servomotor_tensions": frames[:, readout.SERVOMOTORS : readout.SERVOMOTORS + 2],
-        "utilisation": frames[:, readout.UTILISATION],
+def info(results: FloatArray, frames: FloatArray | None) -> dict[str, npt.NDArray[Any]]:
+    """Information of an environment's rows, each value (N, ...).
+
+    ``results`` (N, RESULTS); ``frames`` (N, READOUTS), or None on the simplified model.
+    """
+    found: dict[str, npt.NDArray[Any]] = {
+        "time": results[:, TIME],
+        "load_position": results[:, LOAD : LOAD + 3],
+        "rope_tension": results[:, TENSION],
+        "slack": results[:, SLACK] > 0.0,
+        "omega1": results[:, OMEGA1],
+        "omega2": results[:, OMEGA2],
     }
+    if frames is not None:
+        found |= {
+            "pulley_deflection": frames[:, readout.DEFLECTION : readout.DEFLECTION + 3],
+            "foot_reactions": frames[:, readout.FEET : readout.FEET + 6].reshape(-1, 2, 3),
+            "servomotor_tensions": frames[:, readout.SERVOMOTORS : readout.SERVOMOTORS + 2],
+            "utilisation": frames[:, readout.UTILISATION],
+        }
+    return found
 
 
-def sensed_truth(state: npt.NDArray[np.float64], angles: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def sensed_truth(state: FloatArray, angles: FloatArray) -> FloatArray:
     """True values of the sensors' channels, from the state (N, 14) and roll and pitch (N, 2): (N, channels)."""
     columns = (
-        state[:, 6],
-        state[:, 7],
+        state[:, PULLEY_HEAVE],
+        state[:, PULLEY_VELOCITY_Z],
         angles[:, 0],
         angles[:, 1],
-        state[:, 9],
-        state[:, 10],
-        state[:, 11],
-        state[:, 0],
+        state[:, DRUM_ANGLE],
+        state[:, DRUM_SPEED],
+        state[:, ROPE_TENSION],
+        state[:, DEPTH_ERROR],
     )
     return np.stack(columns, axis=1)

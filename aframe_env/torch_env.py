@@ -10,8 +10,9 @@ import torch
 from gymnasium.error import DependencyNotInstalled
 
 from aframe_env import task
+from aframe_env.config import TaskConfig
 from aframe_env.dynamics.random import episode_uniforms
-from aframe_env.scenario import NUMBERS, Scenario, ScenarioSource
+from aframe_env.scenario import NUMBERS, Scenario
 from aframe_env.scenario.motion import require_coverage
 from aframe_env.simulation import Simulation
 from aframe_env.validation import InvalidValue, require_integer
@@ -28,10 +29,7 @@ class TorchEnvConfig:
     """The arguments of an ``AFrameHeaveTorchEnv``."""
 
     num_envs: int
-    scenario: ScenarioSource | None
-    control_period: float
-    episode_duration: float
-    max_inner_step: float | None
+    task: TaskConfig
     device: str
     seed: int
 
@@ -69,9 +67,8 @@ class AFrameHeaveTorchEnv:
     ``extras["final_obs"]`` (N, 14) has what it ended with, as it has every other row's. ``extras["time_outs"]`` (N,)
     says which rows ended because of their time only.
 
-    - ``scenario``: a ``Scenario``, or the ``ScenarioDistribution`` that each row draws its own from.
-    - ``control_period``, ``episode_duration``: s.
-    - ``max_inner_step``: s; by default as the load's bobbing on its rope asks for.
+    Arguments, by keyword: those of ``AFrameHeaveEnv`` that have to do with the simplified model and its full state, and
+
     - ``device``: "cuda", "cuda:N" (extra ``cuda``) or "cpu".
     - ``seed``: of the rows' scenarios, in [0, 2^53).
     """
@@ -81,37 +78,32 @@ class AFrameHeaveTorchEnv:
     def __init__(
         self,
         num_envs: int,
+        config: TaskConfig | None = None,
         *,
-        scenario: ScenarioSource | None = None,
-        control_period: float = 0.1,
-        episode_duration: float = 60.0,
-        max_inner_step: float | None = None,
         device: str | torch.device = "cuda",
         seed: int = 0,
+        **arguments: Any,
     ) -> None:
         require_integer("num_envs", num_envs, low=1, high=2**24)
         _require_tensordict()
         kind = _kind(device)
-        simulation = Simulation(
-            num_envs if kind == "cpu" else 1,
-            scenario=scenario,
-            control_period=control_period,
-            episode_duration=episode_duration,
-            max_inner_step=max_inner_step,
-        )
-        source = simulation.source
-        if isinstance(source, Scenario):
-            require_coverage(source.motion, "episode_duration", simulation.episode_duration)
-        self.cfg = TorchEnvConfig(
-            num_envs, scenario, control_period, episode_duration, max_inner_step, str(device), seed
-        )
+        config = (config or TaskConfig()).replaced(arguments)
+        if config.model != "simplified" or config.sensors is not None:
+            raise InvalidValue(
+                f"model = {config.model!r}, observation = {config.observation!r}: tensors have the full state of the "
+                "simplified model only"
+            )
+        if isinstance(config.source, Scenario):
+            require_coverage(config.source.motion, "episode_duration", config.duration)
+        simulation = Simulation(num_envs if kind == "cpu" else 1, config)
+        self.cfg = TorchEnvConfig(num_envs, config, str(device), seed)
         self.num_envs = num_envs
         self.observation_space = simulation.observation_space
         """Of one row."""
         self.action_space = simulation.action_space
         """Of one row, rad/s."""
         self.max_episode_length = simulation.episode_steps
-        self._rows = _open_rows(simulation, num_envs, str(device), max_inner_step)
+        self._rows = _open_rows(simulation, num_envs, str(device))
         self.device = self._rows.device
         self.episode_length_buf = torch.zeros(num_envs, dtype=torch.int64, device=self.device)
         """(N,) control steps since each row's start; a row ends when it comes to ``max_episode_length``."""
@@ -239,7 +231,7 @@ def _kind(device: str | torch.device) -> str:
     return kind
 
 
-def _open_rows(simulation: Simulation, rows: int, device: str, max_inner_step: float | None) -> Rows:
+def _open_rows(simulation: Simulation, rows: int, device: str) -> Rows:
     if _kind(device) == "cpu":
         return ProcessorRows(simulation)
     from aframe_env.cuda.device import open_device
@@ -247,4 +239,4 @@ def _open_rows(simulation: Simulation, rows: int, device: str, max_inner_step: f
     opened = open_device(device)
     from aframe_env.cuda.rows import CudaRows
 
-    return CudaRows(simulation, rows, opened, max_inner_step)
+    return CudaRows(simulation, rows, opened)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -13,9 +14,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from aframe_env import task
+from aframe_env.config import TaskConfig
 from aframe_env.env import EnvState
 from aframe_env.rendering import open_renderer
-from aframe_env.scenario import Scenario, ScenarioSource
+from aframe_env.scenario import Scenario
 from aframe_env.simulation import Simulation
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_numbers
 
@@ -43,25 +45,20 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
     def __init__(
         self,
         num_envs: int = 1,
+        config: TaskConfig | None = None,
         *,
-        model: str = "simplified",
-        scenario: ScenarioSource | None = None,
-        control_period: float = 0.1,
-        episode_duration: float = 60.0,
-        observation: task.Observation = "state",
-        max_inner_step: float | None = None,
-        rfes: tuple[int, int] | None = None,
-        rfem_modes: int | None = None,
         max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
+        **arguments: Any,
     ) -> None:
         require_integer("num_envs", num_envs, low=1, high=2**24)
         if render_mode is not None:
             require_choice("render_mode", render_mode, ("rgb_array",))
+        config = (config or TaskConfig()).replaced(arguments)
         if max_episode_steps is not None:
             require_integer("max_episode_steps", max_episode_steps, low=1, high=2**31)
-            episode_duration = max_episode_steps * control_period
+            config = replace(config, episode_duration=max_episode_steps * config.control_period)
         try:
             self._autoreset = AutoresetMode(autoreset_mode)
         except ValueError:
@@ -69,17 +66,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
             raise InvalidValue(f"autoreset_mode = {autoreset_mode!r}: must be one of {modes}") from None
         self.num_envs = num_envs
         self.render_mode = render_mode
-        self._simulation = Simulation(
-            num_envs,
-            model=model,
-            scenario=scenario,
-            control_period=control_period,
-            episode_duration=episode_duration,
-            observation=observation,
-            max_inner_step=max_inner_step,
-            rfes=rfes,
-            rfem_modes=rfem_modes,
-        )
+        self._simulation = Simulation(num_envs, config)
         self.single_observation_space = self._simulation.observation_space
         self.single_action_space = self._simulation.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -262,18 +249,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         return seed
 
     def _infos(self, mask: Rows) -> dict[str, Any]:
-        results = self._simulation.results.copy()
-        values: dict[str, Any] = {
-            "time": results[:, task.TIME],
-            "load_position": results[:, task.LOAD : task.LOAD + 3],
-            "rope_tension": results[:, task.TENSION],
-            "slack": results[:, task.SLACK] > 0.0,
-            "omega1": results[:, task.OMEGA1],
-            "omega2": results[:, task.OMEGA2],
-        }
-        frames = self._simulation.frames()
-        if frames is not None:
-            values |= task.frame_info(frames)
+        values: dict[str, Any] = dict(task.info(self._simulation.results.copy(), self._simulation.frames()))
         present = mask.copy()
         return values | {f"_{key}": present for key in values}
 

@@ -17,8 +17,8 @@ from typing import Any, Final, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env import task
-from aframe_env.scenario import Scenario
+from aframe_env.config import TaskConfig
+from aframe_env.scenario import Scenario, Sensors
 from aframe_env.validation import InvalidValue
 from agents.control.feedback import SensorFeedback, StateFeedback
 from agents.control.inverse_dynamics import InverseDynamics
@@ -56,11 +56,15 @@ class BuildContext:
     """That it will run in. Only a policy that knows the future may look at their seas."""
     nominal: Scenario
     """That a policy which knows no more than the clock may be tuned for."""
-    episode_duration: float
-    """s."""
-    observation: task.Observation
+    config: TaskConfig
+    """The task; its observation is what a policy sees that is not made for another."""
     spread: Spread = in_turn
     """For policies that take many independent computations to build."""
+
+    @property
+    def sensors(self) -> Sensors:
+        """What measures the task for policies on sensors."""
+        return self.config.replaced({"observation": "sensors"}).sensors or Sensors()
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,7 @@ def _drum_still(context: BuildContext) -> Policy:
 
 
 def _optimised(context: BuildContext, scenarios: Sequence[Scenario], tuned: Tuned) -> list[OptimisedDrive]:
-    return context.spread(partial(optimised, tuned, context.episode_duration), scenarios)
+    return context.spread(partial(optimised, tuned, context.config.duration), scenarios)
 
 
 def _nominal_drive(name: str, tuned: Tuned) -> PolicySpec:
@@ -97,8 +101,8 @@ def _drive_for_each(name: str, tuned: Tuned) -> PolicySpec:
     return PolicySpec(name, build, for_each_scenario=True)
 
 
-def _law(make: Callable[[], Policy]) -> PolicySpec:
-    return PolicySpec(make().name, lambda context: make())
+def _law(make: Callable[[Sensors], Policy]) -> PolicySpec:
+    return PolicySpec(make(Sensors()).name, lambda context: make(context.sensors))
 
 
 DRUM_STILL: Final = PolicySpec("drum still", _drum_still)
@@ -107,7 +111,10 @@ REGISTRY: Final[dict[str, PolicySpec]] = {
     for spec in (
         DRUM_STILL,
         *(_nominal_drive(name, how) for name, how in TUNED.items()),
-        *(_law(make) for make in (StateFeedback, SensorFeedback, PredictiveControl, InverseDynamics)),
+        _law(lambda sensors: StateFeedback()),
+        _law(lambda sensors: SensorFeedback(delay=sensors.delay)),
+        _law(lambda sensors: PredictiveControl(sensors=sensors)),
+        _law(lambda sensors: InverseDynamics()),
         *(_drive_for_each(f"{name} for each scenario", how) for name, how in TUNED.items()),
     )
 }
@@ -126,7 +133,7 @@ def slug(name: str) -> str:
 
 
 def choose(text: str) -> PolicySpec:
-    """A policy from its name in the catalogue (or the name's slug), its folder, or ``module:function``."""
+    """A policy from its name in the registry (or the name's slug), its folder, or ``module:function``."""
     by_slug = {slug(name): spec for name, spec in REGISTRY.items()}
     if slug(text) in by_slug:
         return by_slug[slug(text)]
@@ -236,7 +243,7 @@ def _from_module(text: str, module: str, attribute: str) -> PolicySpec:
 
 
 def _seen(context: BuildContext) -> Knowledge:
-    return Knowledge.STATE if context.observation == "state" else Knowledge.SENSORS
+    return Knowledge.STATE if context.config.sensors is None else Knowledge.SENSORS
 
 
 def _is_policy(thing: Any) -> bool:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from aframe_env import task
+from aframe_env.config import TaskConfig
 from aframe_env.dynamics import layout as at
-from aframe_env.scenario import Scenario, ScenarioDistribution
+from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.simulation import Simulation
 from agents.policy import FloatArray, Policy
 
@@ -18,11 +20,23 @@ HELD_OUT_SEED = 20_091_123
 """Scenarios for evaluation are drawn from this seed and their number. Training never draws from it."""
 
 
-def held_out_scenarios(distribution: ScenarioDistribution, count: int) -> list[Scenario]:
+def drawn_scenarios(source: ScenarioSource, seed: int, count: int) -> list[Scenario]:
+    """Return the first ``count`` scenarios of a series; the same ones, whatever the count.
+
+    A single scenario is its own series.
+    """
+    if isinstance(source, Scenario):
+        return [source] * count
+    return [source.draw(np.random.default_rng([seed, i])) for i in range(count)]
+
+
+def held_out_scenarios(source: ScenarioSource, count: int) -> list[Scenario]:
     """Return the first ``count`` held-out scenarios; the same ones, whatever the count."""
-    return [distribution.draw(np.random.default_rng([HELD_OUT_SEED, i])) for i in range(count)]
+    return drawn_scenarios(source, HELD_OUT_SEED, count)
 
 
+HISTORY = (task.DEPTH_ERROR, task.DRUM_SPEED, task.ROPE_TENSION)
+"""What is kept of every control step."""
 BAND = 0.05
 """Depth error that an operator can live with, m: time beyond it is counted."""
 
@@ -57,6 +71,11 @@ class Episodes:
     """(N, steps + 1) rope tension, N."""
 
     @property
+    def control_period(self) -> float:
+        """s."""
+        return float(self.duration / (self.error.shape[1] - 1))
+
+    @property
     def slack(self) -> npt.NDArray[np.bool_]:
         """(N,) whether the rope was ever slack."""
         return self.slack_events > 0
@@ -70,36 +89,28 @@ class Episodes:
 def run(
     policy: Policy,
     scenarios: Sequence[Scenario],
+    config: TaskConfig | None = None,
     *,
-    observation: task.Observation = "state",
-    control_period: float = 0.1,
-    episode_duration: float = 60.0,
-    model: str = "simplified",
-    rfem_modes: int | None = None,
     noise_seed: int = 0,
     progress: Callable[[int], object] | None = None,
+    **arguments: Any,
 ) -> Episodes:
-    """Run ``policy`` through every scenario, on either model (see ``AFrameHeaveEnv``).
+    """Run ``policy`` through every scenario, on the task of ``config`` but for these arguments of the environment.
 
     ``noise_seed`` draws the sensors' noise, the same for every policy.
     """
     rows = len(scenarios)
-    simulation = Simulation(
-        rows,
-        model=model,
-        rfem_modes=rfem_modes,
-        scenario=scenarios[0],
-        observation=observation,
-        control_period=control_period,
-        episode_duration=episode_duration,
-    )
+    config = (config or TaskConfig()).replaced(arguments)
+    # A single scenario stands for all of them: their cranes' winches are alike. It has no sensors of its own.
+    config = config.replaced({"observation": config.sensors or "state", "scenario": scenarios[0]})
+    simulation = Simulation(rows, config)
     seeds = np.random.default_rng(noise_seed).integers(2**63, size=rows).tolist()
     simulation.reset_rows(np.arange(rows), list(zip(scenarios, seeds, strict=True)))
-    policy.reset(scenarios, control_period)
+    policy.reset(scenarios, config.control_period)
     steps = simulation.episode_steps
     tally = _Tally(simulation, scenarios)
     for step in range(steps):
-        simulation.advance(policy.act(simulation.observe(), step * control_period))
+        simulation.advance(policy.act(simulation.observe(), step * config.control_period))
         tally.add()
         if progress is not None:
             progress(step + 1)
@@ -119,20 +130,20 @@ class _Tally:
         self._was_slack = np.zeros(rows, dtype=np.bool_)
         self._slack_events = np.zeros(rows, dtype=np.int64)
         self._omega1, self._omega2 = np.zeros(rows), np.zeros(rows)
-        self._peak_tension = simulation.state[:, 11].copy()
+        self._peak_tension = simulation.state[:, task.ROPE_TENSION].copy()
         self._drum_travel, self._peak_power, self._time_outside = np.zeros(rows), np.zeros(rows), np.zeros(rows)
         self._rope_speed = np.zeros(rows)
         self._record()
 
     def _record(self) -> None:
-        self._histories[:, :, self._step] = self._simulation.state[:, (0, 10, 11)].T
+        self._histories[:, :, self._step] = self._simulation.state[:, HISTORY].T
 
     def add(self) -> None:
         """Count the control step that has just been made."""
         results, period = self._simulation.results, self._simulation.control_period
         self._step += 1
         self._record()
-        error, drum_speed, tension = self._simulation.state[:, (0, 10, 11)].T
+        error, drum_speed, tension = self._simulation.state[:, HISTORY].T
         # A row whose rope has parted is over: it was charged for its free fall, and runs on unobserved.
         alive = self._alive
         self._omega1[alive] = results[alive, task.OMEGA1]

@@ -25,6 +25,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 import aframe_env  # noqa: F401  (registers the environment)
+from aframe_env.scenario import ScenarioDistribution
 from agents.policy import DrumStill, FloatArray, Knowledge, Policy
 from agents.rollout import run
 from train.learn import ppo
@@ -115,7 +116,7 @@ class Clock(BaseCallback):
     def __init__(self, policy: Callable[[], Policy], options: Options) -> None:
         super().__init__()
         self._policy, self._options = policy, options
-        self._scenarios = validation_scenarios(options.scenarios)
+        self._scenarios = validation_scenarios(ScenarioDistribution(), options.scenarios)
         self._still = run(DrumStill(), self._scenarios).rms
         self._looked = 0
         self.reductions: list[float] = []

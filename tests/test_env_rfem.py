@@ -113,12 +113,12 @@ def test_rows_may_have_different_cranes_and_ropes():
 
 def test_a_frame_that_turns_too_far_warns_once_with_the_figure():
     soft = Scenario.paper(crane=stiffer(0.05))
-    static = frame_model(soft.crane.frame, Division(leg=5, beam=2))
+    frame = frame_model(soft.crane.frame, Division(leg=5, beam=2))
     to_drum = np.array(soft.crane.drum_position) - np.array(soft.crane.pulley_position)
     force = 981e3 * (to_drum / np.linalg.norm(to_drum) - np.array([0.0, 0.0, 1.0]))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SmallRotationWarning)
-        position = static(soft.crane, LoadCase(forces={"S": tuple(force.tolist())}), model=static).position
+        position = static(soft.crane, LoadCase(forces={"S": tuple(force.tolist())}), model=frame).position
         largest = np.linalg.norm(position.reshape(-1, 6)[:, 3:], axis=1).max()
     scalar = gymnasium.make("AFrameHeave-v0", scenario=soft, **MESH)
     with pytest.warns(SmallRotationWarning, match=r"turned by 0\.\d+ rad") as caught:

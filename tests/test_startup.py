@@ -110,7 +110,7 @@ def test_without_any_cache_folder_it_still_runs_and_says_so(tmp_path: Path, read
 def test_a_change_of_what_a_kernel_calls_compiles_it_anew(tmp_path: Path) -> None:
     shutil.copytree(PACKAGE, tmp_path / "aframe_env", ignore=shutil.ignore_patterns("__pycache__"))
     before, _ = run(SMALL, PYTHONPATH=tmp_path)
-    called = tmp_path / "aframe_env" / "random.py"
+    called = tmp_path / "aframe_env" / "dynamics" / "random.py"
     source = called.read_text(encoding="utf-8")
     called.write_text(source.replace("/ 9007199254740992.0", "/ 18014398509481984.0"), encoding="utf-8")
     after, announced = run(SMALL, PYTHONPATH=tmp_path)

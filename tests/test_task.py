@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -9,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aframe_env import Crane, HarmonicMotion, Rope, Scenario, ScenarioDistribution
+from aframe_env import Crane, HarmonicMotion, Rope, Scenario, ScenarioDistribution, task
 from aframe_env.dynamics import layout as at
 from aframe_env.engine import Engine
 from aframe_env.env import AFrameHeaveEnv
-from aframe_env.task import LEAST_FALL, free_fall_cost, free_fall_peak
+from aframe_env.task import LEAST_FALL, SENSED, STATE, Quantity, free_fall_cost, free_fall_peak
 
 GRAVITY = 9.81
 UNBREAKABLE = 1e12
@@ -139,3 +141,37 @@ def test_rope_parts_at_its_breaking_load() -> None:
         env.reset(seed=0)
         ends = [env.step(np.array([drum_speed], dtype=np.float32))[2] for _ in range(3)]
         assert any(ends) is parts
+
+
+def documented(heading: str) -> list[tuple[str, str, str]]:
+    """Number, unit and range of each row of the first table after a heading of the environment's docstring."""
+    text = inspect.cleandoc(AFrameHeaveEnv.__doc__ or "")
+    lines = text[text.index(heading) :].splitlines()
+    begin = next(i for i, line in enumerate(lines) if line.startswith("| ---")) + 1
+    rows = itertools.takewhile(lambda line: line.startswith("|"), lines[begin:])
+    cells = [[cell.strip() for cell in row.strip("|").split("|")] for row in rows]
+    return [(number, row[-2], row[-1]) for row in cells for number in row[0].split(", ")]
+
+
+def in_words(low: float, high: float) -> str:
+    """A range as the docstring writes it."""
+    if low == -high:
+        return "±π" if high == np.pi else "±" + plain(high)
+    return f"{plain(low)} ... {plain(high)}"
+
+
+def plain(value: float) -> str:
+    return f"{value:.0f}" if value <= 100.0 else f"{value:.0e}".replace("e+0", "e")
+
+
+@pytest.mark.parametrize(
+    ("heading", "quantities"), [('`observation="state"`', STATE), ('`observation="sensors"`', SENSED)]
+)
+def test_the_docstring_s_tables_are_the_observation(heading: str, quantities: tuple[Quantity, ...]) -> None:
+    wanted = [(str(i), q.unit, in_words(q.low, q.high)) for i, q in enumerate(quantities)]
+    assert documented(heading) == wanted
+
+
+def test_columns_have_the_names_of_the_state() -> None:
+    for index, quantity in enumerate(STATE):
+        assert getattr(task, quantity.name.upper()) == index

@@ -8,11 +8,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import ClassVar
 
 from rich.console import Console
 from rich.progress import Progress
 
-from aframe_env.scenario import ScenarioDistribution
+from aframe_env.scenario import ScenarioSource
 from aframe_env.validation import require_integer
 from agents.drives.objectives import Objective, coarse_step
 from agents.drives.optimisation import FAMILIES, OPTIMISERS, Family, Optimiser, optimise
@@ -22,21 +25,23 @@ from train.shared.cli import parse
 from train.shared.jobs import run_jobs
 from train.shared.markdown import table
 from train.shared.run_folder import RunOptions, open_run, user_errors, write_json, write_text
+from train.shared.scenarios import ScenarioOptions
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(RunOptions):
+class Options(RunOptions, ScenarioOptions):
     """How much to compare."""
 
-    scenarios: int = 5
-    """Held-out random seas beside the paper's case."""
+    bounds: ClassVar[tuple[int, int]] = (0, 10_000)
+    scenarios: int | Path = 5
+    """How many held-out scenarios beside the paper's case; or a TOML file with a distribution of your own."""
     max_evaluations: int = 20_000
     """Most evaluations of the objective for each drive."""
     workers: int | None = None
     """Worker processes; by default one for each core."""
 
     def __post_init__(self) -> None:
-        require_integer("scenarios", self.scenarios, low=0, high=10_000)
+        super().__post_init__()
         require_integer("max_evaluations", self.max_evaluations, low=1, high=10**9)
 
 
@@ -66,12 +71,12 @@ class Found:
     seconds: float
 
 
-def solve(search: Search) -> Found:
-    """Run a search: the paper's case as in the source, a random sea with the comparison's drives."""
+def solve(source: ScenarioSource, search: Search) -> Found:
+    """Run a search: the paper's case as in the paper, a scenario of ``source`` with the comparison's drives."""
     if search.scenario is None:
         scenario, duration, intervals, harmonics = paper_case(), 36.0, 18, 1
     else:
-        scenario = held_out_scenarios(ScenarioDistribution(), search.scenario + 1)[-1]
+        scenario = held_out_scenarios(source, search.scenario + 1)[-1]
         duration, intervals, harmonics = 60.0, 48, 8
     found = optimise(
         search.family,
@@ -121,13 +126,19 @@ def main() -> int:
         opened = open_run(options, "train.optimisers")
         searches = [
             Search(scenario=scenario, family=family, optimiser=optimiser, max_evaluations=options.max_evaluations)
-            for scenario in (None, *range(options.scenarios))
+            for scenario in (None, *range(options.number))
             for family in FAMILIES
             for optimiser in OPTIMISERS
         ]
         try:
             with Progress(console=console) as progress:
-                found = run_jobs(solve, searches, workers=options.workers, progress=progress, description="searches")
+                found = run_jobs(
+                    partial(solve, options.source),
+                    searches,
+                    workers=options.workers,
+                    progress=progress,
+                    description="searches",
+                )
         except KeyboardInterrupt:
             console.print("interrupted: nothing was written")
             return 130

@@ -19,6 +19,7 @@ from gymnasium.error import DependencyNotInstalled
 from rich.console import Console
 
 import aframe_env
+from aframe_env import task
 from aframe_env.scenario import ScenarioDistribution
 from aframe_env.validation import InvalidValue, require_integer, require_number
 from train.shared.cli import parse
@@ -63,15 +64,11 @@ def picture(options: Options) -> npt.NDArray[np.uint8]:
     env.reset(seed=options.scenario_seed)
     steps = round(options.time / env.control_period)
     radius = env.scenario.crane.winch.drum_radius
-    names = [quantity.name for quantity in env.simulation.quantities]
-    heave, velocity, acceleration, angle = (
-        names.index(name) for name in ("pulley_heave", "pulley_velocity_z", "pulley_acceleration_z", "drum_angle")
-    )
     for step in range(steps):
         state = env.simulation.state[0]
         # The pulley's velocity in the middle of the step that the command is held for.
-        ahead = state[velocity] + 0.5 * env.control_period * state[acceleration]
-        behind = state[heave] - radius * state[angle]
+        ahead = state[task.PULLEY_VELOCITY_Z] + 0.5 * env.control_period * state[task.PULLEY_ACCELERATION_Z]
+        behind = state[task.PULLEY_HEAVE] - radius * state[task.DRUM_ANGLE]
         command = (ahead + _CATCH_UP * behind) / radius if 2 * step >= steps else 0.0
         env.step(np.clip([command], env.action_space.low, env.action_space.high).astype(np.float32))
     frame: npt.NDArray[np.uint8] = env.render()

@@ -20,16 +20,16 @@ from rich.progress import Progress
 from scipy.optimize import minimize
 
 from aframe_env import task
-from aframe_env.scenario import ScenarioDistribution
 from aframe_env.validation import InvalidValue, require_integer
 from agents.control.feedback import SENSOR_GAINS, STATE_GAINS, SensorFeedback, StateFeedback
 from agents.control.inverse_dynamics import GAINS as INVERSE_GAINS
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.regulator import Gains
 from agents.policy import DrumStill, FloatArray, Policy
-from agents.rollout import HELD_OUT_SEED, run
+from agents.rollout import HELD_OUT_SEED, drawn_scenarios, run
 from train.shared.cli import parse
 from train.shared.run_folder import RunOptions, open_run, user_errors, write_text
+from train.shared.scenarios import ScenarioOptions
 
 Name = Literal["state", "sensors", "inverse-dynamics"]
 
@@ -51,13 +51,13 @@ TUNABLE: dict[Name, Tunable] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(RunOptions):
+class Options(RunOptions, ScenarioOptions):
     """What to tune, on how much."""
 
     policies: tuple[Name, ...] = tuple(TUNABLE)
     """Policies to tune."""
-    scenarios: int = 200
-    """Training scenarios."""
+    scenarios: int | Path = 200
+    """How many training scenarios; or a TOML file with a scenario or a distribution of your own."""
     evaluations: int = 40
     """Gains to try for each policy."""
     seed: int = 1
@@ -66,7 +66,7 @@ class Options(RunOptions):
     """Output folder."""
 
     def __post_init__(self) -> None:
-        require_integer("scenarios", self.scenarios, low=1, high=10**6)
+        super().__post_init__()
         require_integer("evaluations", self.evaluations, low=1, high=10**6)
         require_integer("seed", self.seed, low=0, high=2**63 - 1)
         if self.seed == HELD_OUT_SEED:
@@ -90,8 +90,7 @@ class Trial:
 
 def study(tunable: Tunable, options: Options, tried: Callable[[Trial], object]) -> list[Trial]:
     """Every trial of the search for one policy's gains; ``tried`` is called after each."""
-    distribution = ScenarioDistribution()
-    scenarios = [distribution.draw(np.random.default_rng([options.seed, i])) for i in range(options.scenarios)]
+    scenarios = drawn_scenarios(options.source, options.seed, options.number)
     still = run(DrumStill(), scenarios).rms
     trials: list[Trial] = []
 

@@ -23,7 +23,7 @@ from aframe_env.simulation import Simulation
 class CudaRows:
     """Rows of the task on a device. No call waits for the device, and nothing but kernels' arguments goes there."""
 
-    def __init__(self, host: Simulation, rows: int, device: torch.device, max_inner_step: float | None) -> None:
+    def __init__(self, host: Simulation, rows: int, device: torch.device) -> None:
         """``host``: one row of the same task on the processor, which has checked the arguments."""
         self.device = device
         self._rows = rows
@@ -32,7 +32,7 @@ class CudaRows:
         self._blocks_of_threads = -(-rows // LANES)
         source = host.source
         self._components = _count_components(source)
-        engine = Engine(1, host.control_period, self._components, max_inner_step)
+        engine = Engine(1, host.control_period, self._components, host.config.max_inner_step)
         vector = engine.row_vector(source if isinstance(source, Scenario) else source.nominal())
         self._room = (len(vector) - at.ROW_SLOTS) // at.COMPONENT_SLOTS
         self._segments = round(host.control_period / vector[at.CONTROL_PERIOD])
@@ -49,7 +49,9 @@ class CudaRows:
         if isinstance(source, Scenario):
             self._tables = (self._constant(vector),)
         else:
-            self._tables = tuple(self._constant(table) for table in tables_of(source, vector, max_inner_step))
+            self._tables = tuple(
+                self._constant(table) for table in tables_of(source, vector, host.config.max_inner_step)
+            )
         self._random = not isinstance(source, Scenario)
         self._seed = 0
 

@@ -27,7 +27,11 @@ class History:
     def record(self, simulation: Simulation) -> None:
         """Append the present."""
         state = simulation.state
-        self._lines.append(np.stack([simulation.results[:, task.TIME], state[:, 0], state[:, 6]], axis=1))
+        self._lines.append(
+            np.stack(
+                [simulation.results[:, task.TIME], state[:, task.DEPTH_ERROR], state[:, task.PULLEY_HEAVE]], axis=1
+            )
+        )
 
     def of(self, row: int) -> FloatArray:
         """Lines (n, 3) of a row's present episode, the oldest first."""

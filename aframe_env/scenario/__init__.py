@@ -3,7 +3,7 @@
 from aframe_env.scenario.crane import GRAVITY, Crane, Frame, Rope, Winch
 from aframe_env.scenario.distribution import NUMBERS, Range, ScenarioDistribution, ScenarioSource
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion, ShipMotion
-from aframe_env.scenario.recorded_motion import RecordedMotion
+from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
 from aframe_env.scenario.scenario import Initial, Scenario
 from aframe_env.scenario.sea import Sea, SeaMotion
 from aframe_env.scenario.sensors import Channel, Sensors
@@ -20,6 +20,7 @@ __all__ = [
     "Initial",
     "Range",
     "RecordedMotion",
+    "RecordedWindow",
     "Rope",
     "Scenario",
     "ScenarioDistribution",

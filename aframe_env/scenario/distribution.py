@@ -10,8 +10,10 @@ import numpy as np
 
 from aframe_env.dynamics.start import critical_damping
 from aframe_env.scenario.crane import GRAVITY, Crane
+from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
 from aframe_env.scenario.scenario import Scenario
 from aframe_env.scenario.sea import FULL_TURN, Sea, SeaMotion, dnv_gamma
+from aframe_env.scenario.sensors import Sensors
 from aframe_env.scenario.vessel import Vessel
 from aframe_env.validation import InvalidValue, require_integer, require_number
 
@@ -44,7 +46,7 @@ def _draw(value: Range, uniform: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class ScenarioDistribution:
-    """What scenarios are drawn from: seas, load masses and rope lengths, each exact or an interval.
+    """What scenarios are drawn from: seas or recorded motions, load masses and rope lengths, exact or intervals.
 
     Sea, load and rope take their random numbers from sub-streams of their own: changing one leaves the others'
     draws alone.
@@ -59,8 +61,11 @@ class ScenarioDistribution:
     gamma: Range | Literal["dnv"] = "dnv"
     """Peak enhancement factor; "dnv" takes the one that goes with Hs and Tp."""
     spectrum: str = "jonswap"
+    """Or "pierson-moskowitz"."""
     spreading: int | None = None
+    """Exponent n of the cosine spreading of directions, see ``Sea``; None for long-crested seas."""
     components: int = 32
+    """Waves that a sea is made of."""
     vessel: Vessel = field(default_factory=Vessel.supply)
     load_mass: Range = (20.0e3, 100.0e3)
     """kg."""
@@ -71,6 +76,12 @@ class ScenarioDistribution:
     ramp: float = 10.0
     """Time over which the ship's motion builds up, s."""
     crane: Crane = field(default_factory=Crane)
+    sensors: Sensors = field(default_factory=Sensors)
+    """What measures the observation "sensors"."""
+    records: tuple[RecordedMotion, ...] = ()
+    """Recorded motions in place of the seas: each episode meets a stretch of one of them, from a random start."""
+    window: float = 60.0
+    """With ``records``: length of a stretch, s; at least an episode's."""
 
     def __post_init__(self) -> None:
         _require_range("hs", self.hs, "m", 0.0, 30.0)
@@ -85,10 +96,27 @@ class ScenarioDistribution:
         _require_range("rope_length", self.rope_length, "m", 0.0, 1e5, low_open=True)
         _require_range("rope_damping_ratio", self.rope_damping_ratio, "of critical", 0.0, 1.0)
         require_integer("components", self.components, low=1, high=4096)
+        if not isinstance(self.crane, Crane):
+            raise InvalidValue(f"crane = {self.crane!r}: must be a Crane")
+        if not isinstance(self.sensors, Sensors):
+            raise InvalidValue(f"sensors = {self.sensors!r}: must be Sensors")
+        require_number("window", self.window, "s", low=0.0, high=1e6, low_open=True)
+        self._require_records()
         self._require_rope()
         # The corners of the distribution must be scenarios: refuse now rather than in the middle of a run.
         for u in (0.0, 1.0):
             self._build(np.full(SUBSTREAM, u), np.full(SUBSTREAM, u), np.full(SUBSTREAM, u))
+
+    def _require_records(self) -> None:
+        """Raise where a record is none, or shorter than the stretch that is drawn from it."""
+        for record in self.records:
+            if not isinstance(record, RecordedMotion):
+                raise InvalidValue(f"records: {record!r} is not a RecordedMotion")
+            if record.duration < self.window:
+                name = "a record" if record.path is None else str(record.path)
+                raise InvalidValue(
+                    f"window = {self.window:g} s: must be in (0, {record.duration:g}] s, the length of {name}"
+                )
 
     def _require_rope(self) -> None:
         """Raise where a rope is longer or shorter than the winch allows, in the user's words."""
@@ -118,7 +146,29 @@ class ScenarioDistribution:
         return self._build(sea, half, half)
 
     def _build(self, u_sea: np.ndarray, u_load: np.ndarray, u_rope: np.ndarray) -> Scenario:
-        s, m, r = u_sea.tolist(), u_load.tolist(), u_rope.tolist()
+        m, r = u_load.tolist(), u_rope.tolist()
+        load_mass, rope_length = _draw(self.load_mass, m[0]), _draw(self.rope_length, r[0])
+        weight = load_mass * GRAVITY
+        stiffness = self.crane.rope.axial_stiffness / self.crane.free_length(rope_length, weight)
+        return Scenario(
+            crane=self.crane,
+            motion=self._window(u_sea) if self.records else self._sea_motion(u_sea),
+            load_mass=load_mass,
+            target_level=self.crane.pulley_position[2] - rope_length,
+            rope_damping=_draw(self.rope_damping_ratio, r[1]) * critical_damping(stiffness, load_mass),
+            ramp=self.ramp,
+        )
+
+    def _window(self, u_sea: np.ndarray) -> RecordedWindow:
+        """Draw a stretch of a record: every start in every record is as likely as any other."""
+        room = np.array([record.duration - self.window for record in self.records])
+        shares = np.cumsum(room + 1e-9) / np.sum(room + 1e-9)
+        index = min(int(np.searchsorted(shares, u_sea[0], side="right")), len(room) - 1)
+        start = float(room[index] * u_sea[1])
+        return RecordedWindow(record=self.records[index], start=start, duration=self.window)
+
+    def _sea_motion(self, u_sea: np.ndarray) -> SeaMotion:
+        s = u_sea.tolist()
         hs, tp = _draw(self.hs, s[0]), _draw(self.tp, s[1])
         gamma = dnv_gamma(hs, tp) if self.gamma == "dnv" else _draw(self.gamma, s[3])
         sea = Sea(
@@ -131,17 +181,7 @@ class ScenarioDistribution:
             components=self.components,
             seed=int(s[4] * 2**53),
         )
-        load_mass, rope_length = _draw(self.load_mass, m[0]), _draw(self.rope_length, r[0])
-        weight = load_mass * GRAVITY
-        stiffness = self.crane.rope.axial_stiffness / self.crane.free_length(rope_length, weight)
-        return Scenario(
-            crane=self.crane,
-            motion=SeaMotion(sea=sea, vessel=self.vessel),
-            load_mass=load_mass,
-            target_level=self.crane.pulley_position[2] - rope_length,
-            rope_damping=_draw(self.rope_damping_ratio, r[1]) * critical_damping(stiffness, load_mass),
-            ramp=self.ramp,
-        )
+        return SeaMotion(sea=sea, vessel=self.vessel)
 
 
 ScenarioSource = Scenario | ScenarioDistribution

@@ -25,13 +25,14 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 from cattrs import Converter
 
+from aframe_env.scenario.crane import Crane
 from aframe_env.scenario.cross_sections import (
     GivenSection,
     ISection,
@@ -42,10 +43,12 @@ from aframe_env.scenario.cross_sections import (
     StressPoint,
     Tube,
 )
+from aframe_env.scenario.distribution import Range, ScenarioDistribution, ScenarioSource
 from aframe_env.scenario.motion import HarmonicMotion, ShipMotion
-from aframe_env.scenario.recorded_motion import RecordedMotion
+from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
 from aframe_env.scenario.scenario import Scenario
 from aframe_env.scenario.sea import Sea, SeaMotion
+from aframe_env.scenario.sensors import Sensors
 from aframe_env.scenario.vessel import Vessel
 from aframe_env.serialization import strict_converter, structure, without_none
 from aframe_env.validation import InvalidValue, require_choice
@@ -57,12 +60,21 @@ _SECTIONS: Mapping[str, type[Section]] = {
     "i": ISection,
     "given": GivenSection,
 }
+_KINDS = ("scenario", "distribution")
 _MOTIONS = ("harmonic", "sea", "recorded")
 _SUPPLY = "supply"
 
 
 def read_scenario(path: str | Path) -> Scenario:
     """Read a scenario. Raises ``InvalidValue`` that names the file and the key of what is wrong."""
+    source = read_scenarios(path)
+    if not isinstance(source, Scenario):
+        raise InvalidValue(f"{path}: a distribution of scenarios: must be one scenario")
+    return source
+
+
+def read_scenarios(path: str | Path) -> ScenarioSource:
+    """Read a scenario or a distribution. Raises ``InvalidValue`` that names the file and the key of what is wrong."""
     path = Path(path)
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -70,7 +82,7 @@ def read_scenario(path: str | Path) -> Scenario:
         raise InvalidValue(f"scenario = {str(path)!r}: cannot be read: {error}") from error
     except tomllib.TOMLDecodeError as error:
         raise InvalidValue(f"{path}: not TOML: {error}") from error
-    return scenario_of(data, path.parent, str(path))
+    return scenarios_of(data, path.parent, str(path))
 
 
 def scenario_of(data: Mapping[str, Any], folder: Path, source: str) -> Scenario:
@@ -81,12 +93,48 @@ def scenario_of(data: Mapping[str, Any], folder: Path, source: str) -> Scenario:
     return structure(_converter(folder), data, Scenario, source)
 
 
-def scenario_text(scenario: Scenario) -> str:
-    """Text of a file that reads back as this very scenario.
+def scenarios_of(data: Mapping[str, Any], folder: Path, source: str) -> ScenarioSource:
+    """Make a scenario of what a file says, or with ``kind = "distribution"`` a distribution."""
+    rest = dict(data)
+    kind = rest.pop("kind", "scenario")
+    try:
+        require_choice("kind", kind, _KINDS)
+    except InvalidValue as error:
+        raise InvalidValue(f"{source}: {error}") from None
+    if kind == "scenario":
+        return scenario_of(rest, folder, source)
+    return _distribution(structure(_converter(folder), rest, _Distribution, source), folder, source)
+
+
+def scenario_source(given: ScenarioSource | str | Path | Mapping[str, Any] | None) -> ScenarioSource:
+    """Return what scenarios come from: as given, read from a file, or made of what a file would say.
+
+    None stands for the default distribution.
+    """
+    if given is None:
+        return ScenarioDistribution()
+    if isinstance(given, Scenario | ScenarioDistribution):
+        return given
+    if isinstance(given, str | Path):
+        return read_scenarios(given)
+    if isinstance(given, Mapping):
+        return scenarios_of(given, Path(), "scenario")
+    raise InvalidValue(f"scenario = {given!r}: must be a Scenario, a ScenarioDistribution, a file or a mapping")
+
+
+def scenario_text(source: ScenarioSource) -> str:
+    """Text of a file that reads back as this very scenario or distribution.
 
     A vessel or a record that was not read from a file cannot be written, and raises ``InvalidValue``.
     """
-    return tomli_w.dumps(without_none(_converter(Path()).unstructure(scenario)))
+    converter = _converter(Path())
+    if isinstance(source, Scenario):
+        return tomli_w.dumps(without_none(converter.unstructure(source)))
+    table = {each.name: getattr(source, each.name) for each in fields(source)}
+    table["vessel"], table["deck_position"] = _vessel_name(source.vessel), list(source.vessel.deck_position)
+    table["records"] = [_record_file(record) for record in source.records]
+    plain = {name: converter.unstructure(value) for name, value in table.items()}
+    return tomli_w.dumps(without_none({"kind": "distribution", **plain}))
 
 
 def _converter(folder: Path) -> Converter:
@@ -109,15 +157,27 @@ def _converter(folder: Path) -> Converter:
         if kind == "harmonic":
             return converter.structure(rest, HarmonicMotion)
         if kind == "recorded":
-            return RecordedMotion.from_csv(folder / converter.structure(rest, _Recorded).file)
-        return _sea_motion(converter.structure(rest, _SeaMotion), folder)
+            return _recorded(converter.structure(rest, _Recorded), folder)
+        table = converter.structure(rest, _SeaMotion)
+        return SeaMotion(sea=table.sea, vessel=_vessel(table.vessel, table.deck_position, folder))
+
+    def interval(value: Any, _: Any) -> Range:
+        if isinstance(value, list | tuple):
+            return converter.structure(value, tuple[float, float])
+        return converter.structure(value, float)
+
+    def peak_enhancement(value: Any, _: Any) -> Range | str:
+        return value if isinstance(value, str) else interval(value, None)
 
     converter.register_structure_hook(StressPoint, stress_point)
     converter.register_structure_hook_func(lambda kind: kind == MemberSection, member)
     converter.register_structure_hook_func(lambda kind: kind == Section, section)
     converter.register_structure_hook_func(lambda kind: kind == ShipMotion, motion)
     converter.register_unstructure_hook(SeaMotion, lambda m: _sea_table(m, converter))
+    converter.register_structure_hook_func(lambda kind: kind == Range, interval)
+    converter.register_structure_hook_func(lambda kind: kind == Range | str, peak_enhancement)
     converter.register_unstructure_hook(RecordedMotion, _recorded_table)
+    converter.register_unstructure_hook(RecordedWindow, lambda m: _recorded_table(m.record, m.start, m.duration))
     harmonic = converter.get_unstructure_hook(HarmonicMotion)
     converter.register_unstructure_hook(HarmonicMotion, lambda m: {"kind": "harmonic", **harmonic(m)})
     for name, cls in _SECTIONS.items():
@@ -138,9 +198,13 @@ def _kind(value: Any, kinds: tuple[str, ...]) -> tuple[str, dict[str, Any]]:
 
 @dataclass(frozen=True)
 class _Recorded:
-    """``[motion]`` of the kind "recorded"."""
+    """``[motion]`` of the kind "recorded": a file, and which stretch of it."""
 
     file: str
+    start: float = 0.0
+    """s from the first sample."""
+    duration: float | None = None
+    """s; None: to the end."""
 
 
 @dataclass(frozen=True)
@@ -152,27 +216,75 @@ class _SeaMotion:
     deck_position: tuple[float, float, float] | None = None
 
 
-def _sea_motion(table: _SeaMotion, folder: Path) -> SeaMotion:
-    vessel = Vessel.supply() if table.vessel == _SUPPLY else Vessel.from_csv(folder / table.vessel)
-    if table.deck_position not in (None, vessel.deck_position):
-        vessel = replace(vessel, deck_position=table.deck_position)
-    return SeaMotion(sea=table.sea, vessel=vessel)
+def _recorded(table: _Recorded, folder: Path) -> RecordedMotion | RecordedWindow:
+    record = RecordedMotion.from_csv(folder / table.file)
+    if table.start == 0.0 and table.duration is None:
+        return record
+    duration = record.duration - table.start if table.duration is None else table.duration
+    return RecordedWindow(record=record, start=table.start, duration=duration)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Distribution:
+    """A file of the kind "distribution": ``ScenarioDistribution``, with files for vessel and records."""
+
+    hs: Range = ScenarioDistribution.hs
+    tp: Range = ScenarioDistribution.tp
+    heading: Range = ScenarioDistribution.heading
+    gamma: Range | str = ScenarioDistribution.gamma
+    spectrum: str = ScenarioDistribution.spectrum
+    spreading: int | None = ScenarioDistribution.spreading
+    components: int = ScenarioDistribution.components
+    vessel: str = _SUPPLY
+    deck_position: tuple[float, float, float] | None = None
+    load_mass: Range = ScenarioDistribution.load_mass
+    rope_length: Range = ScenarioDistribution.rope_length
+    rope_damping_ratio: Range = ScenarioDistribution.rope_damping_ratio
+    ramp: float = ScenarioDistribution.ramp
+    crane: Crane = field(default_factory=Crane)
+    sensors: Sensors = field(default_factory=Sensors)
+    records: tuple[str, ...] = ()
+    window: float = ScenarioDistribution.window
+
+
+def _distribution(table: _Distribution, folder: Path, source: str) -> ScenarioDistribution:
+    values = {each.name: getattr(table, each.name) for each in fields(table) if each.name != "deck_position"}
+    try:
+        values["vessel"] = _vessel(table.vessel, table.deck_position, folder)
+        values["records"] = tuple(RecordedMotion.from_csv(folder / file) for file in table.records)
+        return ScenarioDistribution(**values)
+    except InvalidValue as error:
+        raise InvalidValue(f"{source}: {error}") from error
+
+
+def _vessel(name: str, deck_position: tuple[float, float, float] | None, folder: Path) -> Vessel:
+    vessel = Vessel.supply() if name == _SUPPLY else Vessel.from_csv(folder / name)
+    if deck_position not in (None, vessel.deck_position):
+        vessel = replace(vessel, deck_position=deck_position)
+    return vessel
+
+
+def _vessel_name(vessel: Vessel) -> str:
+    if vessel.path is None:
+        raise InvalidValue(f"vessel {vessel.name!r} was not read from a file: a scenario file cannot name it")
+    return _SUPPLY if vessel.path == Vessel.supply().path else str(vessel.path.resolve())
+
+
+def _record_file(record: RecordedMotion) -> str:
+    if record.path is None:
+        raise InvalidValue("the recorded motion was not read from a file: a scenario file cannot name it")
+    return str(record.path.resolve())
 
 
 def _sea_table(motion: SeaMotion, converter: Converter) -> dict[str, Any]:
-    vessel = motion.vessel
-    if vessel.path is None:
-        raise InvalidValue(f"vessel {vessel.name!r} was not read from a file: a scenario file cannot name it")
-    name = _SUPPLY if vessel.path == Vessel.supply().path else str(vessel.path.resolve())
     return {
         "kind": "sea",
-        "vessel": name,
-        "deck_position": list(vessel.deck_position),
+        "vessel": _vessel_name(motion.vessel),
+        "deck_position": list(motion.vessel.deck_position),
         "sea": converter.unstructure(motion.sea),
     }
 
 
-def _recorded_table(motion: RecordedMotion) -> dict[str, Any]:
-    if motion.path is None:
-        raise InvalidValue("the recorded motion was not read from a file: a scenario file cannot name it")
-    return {"kind": "recorded", "file": str(motion.path.resolve())}
+def _recorded_table(record: RecordedMotion, start: float = 0.0, duration: float | None = None) -> dict[str, Any]:
+    table: dict[str, Any] = {"kind": "recorded", "file": _record_file(record)}
+    return table if duration is None else {**table, "start": start, "duration": duration}

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -20,9 +20,6 @@ import scipy
 
 from aframe_env.scenario.motion import COORDINATES, FloatArray
 from aframe_env.validation import InvalidValue, require_number
-
-if TYPE_CHECKING:
-    pass
 
 _LENGTHS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
 _ANGLES: Final = {"rad": 1.0, "deg": math.pi / 180.0}
@@ -104,11 +101,47 @@ class RecordedMotion:
 
     def table(self, period: float) -> FloatArray:
         """Coordinates, rates and accelerations at 0, ``period``, ... up to ``duration``: (T, 18)."""
-        require_number("period", period, "s", low=0.0, high=1e6, low_open=True)
-        # A duration that is a whole number of periods up to rounding has its last line too.
-        count = math.floor(self.duration / period + 1e-6) + 1
-        times = np.minimum(np.arange(count) * period, self.duration)
-        return np.concatenate(list(self.at(times)), axis=1)
+        return np.concatenate(list(self.at(grid(self.duration, period))), axis=1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedWindow:
+    """A stretch of a record: what the ship did from ``start`` on, ``duration`` s long.
+
+    Raises ``InvalidValue`` where the record does not reach so far.
+    """
+
+    record: RecordedMotion
+    start: float
+    """s from the record's first sample."""
+    duration: float
+    """s."""
+
+    def __post_init__(self) -> None:
+        longest = self.record.duration
+        require_number("duration", self.duration, "s", low=0.0, high=longest, low_open=True)
+        require_number("start", self.start, "s", low=0.0, high=longest - self.duration)
+
+    @property
+    def path(self) -> Path | None:
+        """The record's file, if it was read from one."""
+        return self.record.path
+
+    def at(self, times: npt.ArrayLike) -> FloatArray:
+        """Coordinates, rates and accelerations at ``times`` (T,) s from the window's start: array (3, T, 6)."""
+        return self.record.at(self.start + np.atleast_1d(np.asarray(times, dtype=np.float64)))
+
+    def table(self, period: float) -> FloatArray:
+        """Coordinates, rates and accelerations at 0, ``period``, ... up to ``duration``: (T, 18)."""
+        return np.concatenate(list(self.at(grid(self.duration, period))), axis=1)
+
+
+def grid(duration: float, period: float) -> FloatArray:
+    """Times 0, ``period``, ... up to ``duration`` (T,) s."""
+    require_number("period", period, "s", low=0.0, high=1e6, low_open=True)
+    # A duration that is a whole number of periods up to rounding has its last line too.
+    count = math.floor(duration / period + 1e-6) + 1
+    return np.asarray(np.minimum(np.arange(count) * period, duration))
 
 
 def _check(times: FloatArray, coordinates: FloatArray, places: list[str], source: str) -> None:

@@ -35,7 +35,7 @@ _QUANTILES = 2049
 
 def dnv_gamma(hs: float, tp: float) -> float:
     """Peak enhancement factor that goes with Hs [m] and Tp [s] (DNV-RP-C205, 3.5.5.5), from 1 to 5."""
-    ratio = tp / math.sqrt(hs)
+    ratio = tp / math.sqrt(hs) if hs > 0.0 else math.inf
     if ratio <= 3.6:
         return 5.0
     return max(1.0, math.exp(5.75 - 1.15 * ratio))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Final
@@ -22,7 +22,7 @@ from safetensors.numpy import load as load_arrays
 from safetensors.numpy import save as save_arrays
 from scipy.interpolate import RegularGridInterpolator
 
-from aframe_env.scenario import Scenario
+from aframe_env.scenario import Crane, Scenario
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion
 from aframe_env.serialization import strict_converter, structure
 from aframe_env.validation import InvalidValue, require_number
@@ -54,23 +54,20 @@ class Node:
     """Damping of the load's bobbing on the rope, share of critical."""
     periods: float = 6.0
     """How long the drive is optimised over."""
+    crane: Crane = field(default_factory=Crane)
 
     @property
     def scenario(self) -> Scenario:
         """The load starts at rest, under a tip that moves upwards from the middle of its stroke."""
         heave = Harmonic(coordinate="heave", amplitude=self.amplitude, period=self.period)
-        level = Scenario().crane.pulley_position[2] - self.length
         case = Scenario(
-            motion=HarmonicMotion(harmonics=(heave,)), load_mass=self.mass, target_level=level, initial="rest"
-        )
-        critical = 2.0 * case.load_mass * case.rope_frequency
-        return Scenario(
-            motion=case.motion,
+            crane=self.crane,
+            motion=HarmonicMotion(harmonics=(heave,)),
             load_mass=self.mass,
-            target_level=level,
-            rope_damping=self.damping_ratio * critical,
+            target_level=self.crane.pulley_position[2] - self.length,
             initial="rest",
         )
+        return replace(case, rope_damping=self.damping_ratio * 2.0 * case.load_mass * case.rope_frequency)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from aframe_env import InvalidValue, ScenarioDistribution
+from aframe_env.config import TaskConfig
 from agents import load
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, card_text, digest, serialise
 from agents.learned.features import STATE_FEATURES
@@ -39,8 +40,7 @@ def context(count=2):
     return BuildContext(
         scenarios=held_out_scenarios(distribution, count),
         nominal=distribution.nominal(),
-        episode_duration=10.0,
-        observation="state",
+        config=TaskConfig(episode_duration=10.0),
     )
 
 

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aframe_env import Scenario, ScenarioDistribution, Sea, SeaMotion
+from aframe_env.config import TaskConfig
 from aframe_env.rendering.history import History
 from aframe_env.rendering.scene import scene_of
 from aframe_env.rendering.view import View, round_limit
@@ -52,7 +53,7 @@ def test_round_limit_is_close_above(value: float) -> None:
 
 @pytest.mark.parametrize("rows", [1, 3])
 def test_scene_is_what_the_simulation_says(rows: int) -> None:
-    simulation = Simulation(rows, scenario=ScenarioDistribution(hs=4.0))
+    simulation = Simulation(rows, TaskConfig(scenario=ScenarioDistribution(hs=4.0)))
     rng = np.random.default_rng(5)
     simulation.reset_rows(np.arange(rows), [simulation.draw(rng) for _ in range(rows)])
     for _ in range(250):
@@ -115,7 +116,7 @@ def test_waves_build_up_with_the_ships_motion_and_harmonic_motion_has_none() -> 
 
 
 def test_history_is_of_the_present_episode() -> None:
-    simulation = Simulation(2, control_period=0.5)
+    simulation = Simulation(2, TaskConfig(control_period=0.5))
     rng = np.random.default_rng(0)
     history = History(simulation.control_period)
 

@@ -10,9 +10,23 @@ from typing import Any
 
 import pytest
 
-from aframe_env import Crane, Frame, Harmonic, RecordedMotion, Rope, Scenario, Sea, Vessel, Winch, read_scenario
+from aframe_env import (
+    Channel,
+    Crane,
+    Frame,
+    Harmonic,
+    RecordedMotion,
+    Rope,
+    Scenario,
+    ScenarioDistribution,
+    Sea,
+    Sensors,
+    Vessel,
+    Winch,
+    read_scenarios,
+)
 from aframe_env.scenario.cross_sections import FrameStructure, Material, Servomotor
-from aframe_env.scenario.file import _SECTIONS, _Recorded, _SeaMotion
+from aframe_env.scenario.file import _SECTIONS, _Distribution, _Recorded, _SeaMotion
 
 PAGE = (Path(__file__).parents[2] / "docs" / "scenario-files.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```(\w+)\n(.*?)```", PAGE, flags=re.DOTALL)
@@ -22,6 +36,9 @@ TABLES = {
     _SeaMotion: '### `kind = "sea"`',
     Sea: "`[motion.sea]`:",
     _Recorded: '### `kind = "recorded"`',
+    _Distribution: "## Distributions",
+    Sensors: "`[sensors]`:",
+    Channel: "Each channel is a table",
     Crane: "## `[crane]`",
     Rope: "`[crane.rope]`:",
     Winch: "`[crane.winch]`:",
@@ -50,19 +67,16 @@ def default_of(item: Any) -> Any:
 def test_every_key_is_there_with_its_default(kind: type) -> None:
     documented = rows(TABLES[kind])
     known = {item.name: default_of(item) for item in fields(kind)}  # type: ignore[arg-type]
-    assert set(documented) == set(known) - ELSEWHERE
+    assert set(documented) == set(known) - (ELSEWHERE if kind is Scenario else set())
     for name, text in documented.items():
         default = known[name]
         if default is MISSING or is_dataclass(default):
-            assert text in ("", "the reference crane's")
+            assert text in ("", "the reference crane's", "the package's")
         elif default is None:
             assert text in ("none", "the vessel's")
         else:
             value = tomllib.loads(f"x = {text}")["x"]
-            if isinstance(default, float):
-                assert value == pytest.approx(default, rel=1e-5)
-            else:
-                assert value == (list(default) if isinstance(default, tuple) else default)
+            assert value == (default if isinstance(default, str) else pytest.approx(default, rel=1e-5))
 
 
 def test_every_section_is_there_with_its_keys() -> None:
@@ -76,7 +90,8 @@ def test_the_examples_are_read(tmp_path: Path) -> None:
     assert len(examples) >= 3
     for text in examples:
         (tmp_path / "example.toml").write_text(text, encoding="utf-8")
-        assert read_scenario(tmp_path / "example.toml") != Scenario.paper()
+        source = read_scenarios(tmp_path / "example.toml")
+        assert source not in (Scenario.paper(), ScenarioDistribution())
 
 
 def test_the_csv_examples_are_read(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from rich.console import Console
@@ -39,10 +40,11 @@ from train.shared.run_folder import (
     write_json,
     write_text,
 )
+from train.shared.scenarios import ScenarioOptions
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(RunOptions):
+class Options(RunOptions, ScenarioOptions):
     """The map's grid, and how it is tested."""
 
     amplitudes: tuple[float, ...] = (0.25, 0.5, 1.0, 2.0, 4.0)
@@ -55,8 +57,10 @@ class Options(RunOptions):
     """Rope lengths |LS|, m."""
     held_out: int = 200
     """Regular heaves between the nodes that the approximation is held against."""
-    scenarios: int = 60
-    """Held-out scenarios of each kind of sea."""
+    bounds: ClassVar[tuple[int, int]] = (2, 10**6)
+    scenarios: int | Path = 60
+    """How many held-out scenarios of each kind of sea; or a TOML file with a scenario or a distribution of your own,
+    whose crane the map is then made for."""
     seed: int = 0
     """Draws the heaves between the nodes."""
     workers: int | None = None
@@ -65,6 +69,7 @@ class Options(RunOptions):
     """Keeps what is finished."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name, unit, low, high in (
             ("amplitudes", "m", 1e-3, 20.0),
             ("periods", "s", 1.0, 100.0),
@@ -77,14 +82,13 @@ class Options(RunOptions):
             if len(values) < 2 or any(b <= a for a, b in itertools.pairwise(values)):
                 raise InvalidValue(f"{name} = {values}: must be at least 2 rising values")
         require_integer("held_out", self.held_out, low=1, high=10**6)
-        require_integer("scenarios", self.scenarios, low=2, high=10**6)
         require_integer("seed", self.seed, low=0, high=2**32 - 1)
 
     @property
     def nodes(self) -> list[Node]:
         """Every node, in the order of the map's axes."""
         grid = itertools.product(self.amplitudes, self.periods, self.masses, self.lengths)
-        return [Node(amplitude=a, period=p, mass=m, length=length) for a, p, m, length in grid]
+        return [Node(amplitude=a, period=p, mass=m, length=length, crane=self.source.crane) for a, p, m, length in grid]
 
 
 def assemble(options: Options, found: list[NodeDrive]) -> DriveMap:
@@ -102,7 +106,7 @@ def run(options: Options, console: Console) -> int:
     opened = open_run(options, "train.drive_map")
     folder, command = opened.folder, opened.command
     version = version_of(module, functions, objectives, optimisation)
-    nodes = options.nodes
+    nodes, crane = options.nodes, options.source.crane
     try:
         with Progress(console=console) as bars:
             begin = time.perf_counter()
@@ -115,12 +119,12 @@ def run(options: Options, console: Console) -> int:
             drive_map = assemble(options, found)
             held_out = run_jobs(
                 check,
-                between_nodes(drive_map, options.held_out, options.seed),
+                between_nodes(drive_map, crane, options.held_out, options.seed),
                 workers=options.workers,
                 progress=bars,
                 description="between the nodes",
             )
-            seas = compare_in(drive_map, folder, options.scenarios, options.workers, bars)
+            seas = compare_in(drive_map, folder, options, options.workers, bars)
     except KeyboardInterrupt:
         console.print(f"interrupted: finished nodes are kept in {options.store}; the same command goes on from there")
         return 130
@@ -129,8 +133,8 @@ def run(options: Options, console: Console) -> int:
     write_text(folder / CARD, card)
     write_json(folder / "held_out.json", [each.plain for each in held_out])
     opened.record(options, seed=options.seed)
-    draw(folder / "drive_map.png", drive_map, held_out, seas)
-    text = notes(command, drive_map, found, held_out, seas, fresh, rate)
+    draw(folder / "drive_map.png", drive_map, crane, held_out, seas)
+    text = notes(command, drive_map, crane, found, held_out, seas, fresh, rate)
     write_text(folder / "notes.md", text)
     console.print(text, soft_wrap=True, markup=False)
     console.print(f"written: {folder}")

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from aframe_env.scenario import Crane
 from agents.drives.functions import RampedDrive
 from agents.drives.map import DriveMap, Node, NodeDrive, optimise_node
 from agents.drives.objectives import Objective, coarse_step
@@ -40,11 +41,13 @@ class HeldOut:
 
     @property
     def plain(self) -> dict[str, Any]:
-        """As plain data."""
-        return asdict(self)
+        """As plain data, the crane left out."""
+        data = asdict(self)
+        del data["node"]["crane"]
+        return data
 
 
-def between_nodes(drive_map: DriveMap, count: int, seed: int) -> list[Between]:
+def between_nodes(drive_map: DriveMap, crane: Crane, count: int, seed: int) -> list[Between]:
     """Regular heaves drawn evenly (periods and lengths in their logarithms) inside the map."""
     u = np.random.default_rng(seed).random((count, 4))
     lows, highs = (
@@ -56,7 +59,7 @@ def between_nodes(drive_map: DriveMap, count: int, seed: int) -> list[Between]:
         place[:, i] = low[i] * (high[i] / low[i]) ** u[:, i]
     ratio = drive_map.ratio_at(*place.T)
     return [
-        Between(Node(amplitude=a, period=p, mass=m, length=length), r.real, r.imag)
+        Between(Node(amplitude=a, period=p, mass=m, length=length, crane=crane), r.real, r.imag)
         for (a, p, m, length), r in zip(place.tolist(), ratio.tolist(), strict=True)
     ]
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from aframe_env.scenario import Crane
 from agents.drives.map import DriveMap
 from train.drive_map.between_nodes import HeldOut
 from train.drive_map.notes import closed_form
@@ -17,13 +18,13 @@ from train.evaluate.statistics import reductions
 from train.shared.run_folder import write_atomically
 
 
-def draw(path: Path, drive_map: DriveMap, held_out: Sequence[HeldOut], seas: Sequence[InSea]) -> None:
+def draw(path: Path, drive_map: DriveMap, crane: Crane, held_out: Sequence[HeldOut], seas: Sequence[InSea]) -> None:
     """The map against the closed form, the approximation's error, and the reduction in each kind of sea."""
     figure = Figure(figsize=(12.0, 7.6), layout="constrained")
     ratio, lead, error, reduction = figure.subplot_mosaic([["r", "l", "e"], ["s", "s", "s"]]).values()
     tonnes = drive_map.mass / 1e3
     every = np.moveaxis(drive_map.ratio, 2, 0).reshape(len(tonnes), -1)
-    ratio.plot(tonnes, closed_form(drive_map), color=COLOURS[1], lw=2, label="1/(1 + m g / (E_R F_R))")
+    ratio.plot(tonnes, closed_form(drive_map, crane), color=COLOURS[1], lw=2, label="1/(1 + m g / (E_R F_R))")
     spread = np.repeat(tonnes, every.shape[1])
     ratio.plot(spread, np.abs(every).ravel(), "o", color=COLOURS[2], ms=4, alpha=0.4, label="optimised, every node")
     ratio.set(xlabel="load mass, t", ylabel="rope paid out / heave", title="Ratio at the nodes")

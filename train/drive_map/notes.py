@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from aframe_env.scenario import Crane
 from agents.drives.map import DriveMap, Node, NodeDrive, ideal_ratio
 from agents.policy import FloatArray
 from train.drive_map.between_nodes import HeldOut
@@ -60,16 +61,17 @@ def summary(seas: Sequence[InSea]) -> str:
     return table(["sea", *policies], ([sea.kind, *(cells(row)[column] for row in sea.rows[1:])] for sea in seas))
 
 
-def closed_form(drive_map: DriveMap) -> FloatArray:
+def closed_form(drive_map: DriveMap, crane: Crane) -> FloatArray:
     """(M,) the ideal ratio at the map's masses."""
     a, p, length = drive_map.amplitude[0], drive_map.period[0], drive_map.length[0]
-    nodes = [Node(amplitude=a, period=p, mass=m, length=length) for m in drive_map.mass.tolist()]
+    nodes = [Node(amplitude=a, period=p, mass=m, length=length, crane=crane) for m in drive_map.mass.tolist()]
     return np.array([ideal_ratio(node.scenario) for node in nodes])
 
 
 def notes(
     command: str,
     drive_map: DriveMap,
+    crane: Crane,
     found: Sequence[NodeDrive],
     held_out: Sequence[HeldOut],
     seas: Sequence[InSea],
@@ -78,7 +80,7 @@ def notes(
 ) -> str:
     """Text of notes.md; ``fresh`` nodes were optimised in this run, at ``rate`` a second."""
     ratio = np.abs(drive_map.ratio)
-    off = np.abs(drive_map.ratio - closed_form(drive_map)[:, None])
+    off = np.abs(drive_map.ratio - closed_form(drive_map, crane)[:, None])
     error = np.array([each.ratio_error for each in held_out])
     left = np.array([each.remaining for each in held_out])
     best = np.array([each.optimum.remaining for each in held_out])

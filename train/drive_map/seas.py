@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
-from typing import Final
 
 from rich.progress import Progress
 
-from aframe_env.scenario import ScenarioDistribution
+from aframe_env.config import TaskConfig
+from aframe_env.scenario import Scenario, ScenarioSource
 from agents.drives.map import DriveMap
 from agents.drives.map_policy import DriveMapPolicy
 from agents.drives.policy import DrivePolicy
@@ -18,14 +18,22 @@ from agents.policy import DrumStill, Knowledge, Policy
 from agents.rollout import held_out_scenarios, run
 from train.evaluate.statistics import Entry, Row, compare
 from train.evaluate.tables import write_comparison
-from train.shared.tuned_drives import DURATION, tune
+from train.shared.scenarios import ScenarioOptions
+from train.shared.tuned_drives import tune
 
-KINDS: Final[dict[str, ScenarioDistribution]] = {
-    "regular waves": ScenarioDistribution(components=1),
-    "swell": ScenarioDistribution(tp=(12.0, 18.0), gamma=10.0),
-    "random seas": ScenarioDistribution(),
-}
-"""Load mass, rope length and heading are drawn alike in all of them; swell is as narrow as JONSWAP goes."""
+
+def kinds_of(source: ScenarioSource) -> dict[str, ScenarioSource]:
+    """Kinds of sea to run in: three of a distribution of seas; what is given, where it is none.
+
+    Load mass, rope length and heading are drawn alike in all of them; swell is as narrow as JONSWAP goes.
+    """
+    if isinstance(source, Scenario) or source.records:
+        return {"as given": source}
+    return {
+        "regular waves": replace(source, components=1),
+        "swell": replace(source, tp=(12.0, 18.0), gamma=10.0),
+        "random seas": source,
+    }
 
 
 @dataclass(frozen=True)
@@ -39,24 +47,26 @@ class InSea:
 
 
 def compare_in(
-    drive_map: DriveMap, folder: Path, scenarios: int, workers: int | None, progress: Progress
+    drive_map: DriveMap, folder: Path, scenarios: ScenarioOptions, workers: int | None, progress: Progress
 ) -> list[InSea]:
-    """Run every policy over ``scenarios`` held-out scenarios of each kind, and write a folder for each."""
-    drawn = {kind: held_out_scenarios(distribution, scenarios) for kind, distribution in KINDS.items()}
+    """Run every policy over held-out scenarios of each kind of sea, and write a folder for each."""
+    kinds, config = kinds_of(scenarios.source), TaskConfig(scenario=scenarios.source)
+    drawn = {kind: held_out_scenarios(source, scenarios.number) for kind, source in kinds.items()}
     every = [scenario for each in drawn.values() for scenario in each]
-    best = iter(tune(("S-Ω1",), every, optimiser="gauss-newton", workers=workers, progress=progress)["S-Ω1"])
-    bar = progress.add_task("seas", total=4 * len(KINDS))
+    tuned = tune(("S-Ω1",), every, config.duration, optimiser="gauss-newton", workers=workers, progress=progress)
+    best = iter(tuned["S-Ω1"])
+    bar = progress.add_task("seas", total=4 * len(kinds))
     found = []
     for kind, met in drawn.items():
         policies: list[Policy] = [
             DrumStill(),
-            DriveMapPolicy(drive_map, duration=DURATION),
-            DriveMapPolicy(drive_map, None, duration=DURATION),
-            DrivePolicy("S-Ω1 for each scenario", list(islice(best, scenarios)), Knowledge.FUTURE),
+            DriveMapPolicy(drive_map, duration=config.duration),
+            DriveMapPolicy(drive_map, None, duration=config.duration),
+            DrivePolicy("S-Ω1 for each scenario", list(islice(best, len(met))), Knowledge.FUTURE),
         ]
         entries = []
         for policy in policies:
-            entries.append(Entry(policy.name, policy.knows, run(policy, met, episode_duration=DURATION)))
+            entries.append(Entry(policy.name, policy.knows, run(policy, met, config)))
             progress.advance(bar)
         rows = compare(entries, entries[0].episodes)
         write_comparison(folder / kind.replace(" ", "-"), rows, entries)

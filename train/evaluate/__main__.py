@@ -24,7 +24,7 @@ REPORT_PACKAGES = ("jinja2", "plotly", "pyarrow")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(HeldOut, RunOptions):
+class Options(RunOptions, HeldOut):
     """Which policies, on what."""
 
     policies: tuple[str, ...] = (

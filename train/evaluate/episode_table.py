@@ -98,7 +98,7 @@ def table(comparison: Comparison) -> pyarrow.Table:
             "policy": [entry.policy] * count,
             "knows": [entry.knows.value] * count,
             "privileged": [entry.knows is Knowledge.FUTURE] * count,
-            "model": [comparison.held_out.model] * count,
+            "model": [comparison.config.model] * count,
             "scenario": list(range(count)),
             **{field.name: [getattr(t, field.name) for t in traits[:count]] for field in fields(Traits)},
             **{name: np.asarray(figure).tolist() for name, figure in figures.items()},

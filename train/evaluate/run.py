@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Final, Literal
+from typing import ClassVar, Final, Literal
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from aframe_env import task
-from aframe_env.flexible_engine import mesh_of
-from aframe_env.scenario import Scenario, ScenarioDistribution
+from aframe_env.config import TaskConfig
+from aframe_env.scenario import Scenario
 from aframe_env.validation import require_integer
 from agents.drives.tuned import TUNED
 from agents.policy import Knowledge, Policy
@@ -23,9 +23,8 @@ from train.evaluate.figure import comparison_figure
 from train.evaluate.statistics import Entry, Row, compare
 from train.evaluate.tables import rich_table, write_comparison
 from train.shared.jobs import run_jobs
-from train.shared.tuned_drives import DURATION
+from train.shared.scenarios import ScenarioOptions
 
-CONTROL_PERIOD: Final = 0.1
 AFTER_TRAINING: Final = (
     *TUNED,
     "feed-forward + feedback (state)",
@@ -37,24 +36,40 @@ AFTER_TRAINING: Final = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class HeldOut:
-    """On what policies are compared."""
+class HeldOut(ScenarioOptions):
+    """On what policies are compared: held-out scenarios, a series that training never draws from, and the task."""
 
-    scenarios: int = 200
-    """Held-out scenarios: the first so many of a series that training never draws from."""
+    bounds: ClassVar[tuple[int, int]] = (1, 20_000)
     privileged: int = 20
-    """The first so many of them for the drives that are optimised for each scenario, its whole future known."""
+    """The first so many of them, or all if there are fewer, for the drives that are optimised for each scenario, its
+    whole future known."""
     observation: Literal["state", "sensors"] = "state"
     """What a policy sees that is not made for either; an agent sees what it was trained on."""
     model: Literal["simplified", "rfem"] = "simplified"
     """Model that the policies run on; drives are optimised on the simplified one."""
     rfem_modes: int | None = None
     """With rfem, the number of natural modes to keep; all by default."""
+    control_period: float = TaskConfig.control_period
+    """Control step, s; an agent runs at the one that it was trained at."""
+    episode_duration: float = TaskConfig.episode_duration
+    """s."""
 
     def __post_init__(self) -> None:
-        mesh_of(self.model, None, self.rfem_modes)
-        require_integer("scenarios", self.scenarios, low=1, high=20_000)
-        require_integer("privileged", self.privileged, low=0, high=self.scenarios)
+        super().__post_init__()
+        require_integer("privileged", self.privileged, low=0, high=10**6)
+        self.config  # noqa: B018 - raises here, before anything is written
+
+    @cached_property
+    def config(self) -> TaskConfig:
+        """The task."""
+        return TaskConfig(
+            model=self.model,
+            scenario=self.source,
+            control_period=self.control_period,
+            episode_duration=self.episode_duration,
+            observation=self.observation,
+            rfem_modes=self.rfem_modes,
+        )
 
 
 @dataclass(frozen=True)
@@ -63,7 +78,7 @@ class Comparison:
 
     entries: tuple[Entry, ...]
     scenarios: tuple[Scenario, ...]
-    held_out: HeldOut
+    config: TaskConfig
 
     @property
     def still(self) -> Episodes:
@@ -78,8 +93,9 @@ class Comparison:
 
 def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console) -> Comparison:
     """Run the drum still and every policy that was chosen over the held-out scenarios."""
-    distribution = ScenarioDistribution()
-    scenarios = held_out_scenarios(distribution, held_out.scenarios)
+    config = held_out.config
+    source = config.source
+    scenarios = held_out_scenarios(source, held_out.number)
     first = scenarios[: held_out.privileged]
     entries = []
     with Progress(
@@ -92,34 +108,29 @@ def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console) ->
             policy = spec.build(
                 BuildContext(
                     scenarios=mine,
-                    nominal=distribution.nominal(),
-                    episode_duration=DURATION,
-                    observation=held_out.observation,
+                    nominal=source if isinstance(source, Scenario) else source.nominal(),
+                    config=config,
                     spread=partial(run_jobs, progress=progress, description=f"{spec.name}: preparing"),
                 )
             )
-            bar = progress.add_task(spec.name, total=round(DURATION / CONTROL_PERIOD))
+            bar = progress.add_task(spec.name, total=config.steps)
             episodes = run(
                 policy,
                 mine,
-                observation=_observation(policy, held_out),
-                control_period=CONTROL_PERIOD,
-                episode_duration=DURATION,
-                model=held_out.model,
-                rfem_modes=held_out.rfem_modes,
+                config.replaced({"observation": _observation(policy, config)}),
                 progress=lambda step, bar=bar: progress.update(bar, completed=step),  # type: ignore[misc]
             )
             entries.append(Entry(spec.name, policy.knows, episodes))
-    return Comparison(tuple(entries), tuple(scenarios), held_out)
+    return Comparison(tuple(entries), tuple(scenarios), config)
 
 
-def _observation(policy: Policy, held_out: HeldOut) -> task.Observation:
+def _observation(policy: Policy, config: TaskConfig) -> task.Observation:
     seen: dict[Knowledge, task.Observation] = {
         Knowledge.STATE: "state",
         Knowledge.FUTURE: "state",
         Knowledge.SENSORS: "sensors",
     }
-    return seen.get(policy.knows, held_out.observation)
+    return seen.get(policy.knows, config.observation)
 
 
 def write(folder: Path, comparison: Comparison, console: Console) -> None:
@@ -130,7 +141,6 @@ def write(folder: Path, comparison: Comparison, console: Console) -> None:
     console.print(f"comparison: {folder / 'comparison.md'}, {folder / 'comparison.png'}")
 
 
-def evaluate(policy: Policy, folder: Path, count: int, privileged: int, console: Console) -> None:
+def evaluate(policy: Policy, folder: Path, held_out: HeldOut, console: Console) -> None:
     """Compare an agent with the drum still and the paper's drives, and write the comparison into ``folder``."""
-    held_out = HeldOut(scenarios=count, privileged=privileged)
     write(folder, run_all([as_spec(policy), *choose_all(AFTER_TRAINING)], held_out, console), console)

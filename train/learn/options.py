@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
 
+from aframe_env.config import TaskConfig
 from aframe_env.validation import require_choice, require_integer, require_number
+from train.evaluate.run import HeldOut
 from train.shared.run_folder import RunOptions
-
-EPISODE_DURATION: Final = 60.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,8 +27,12 @@ class LearningOptions(RunOptions):
     """Train so many agents, with seeds one after another, each in a folder of its own."""
     observation: Literal["state", "sensors"] = "state"
     """What the agent sees."""
-    control_period: float = 0.1
+    scenarios: Path | None = None
+    """A TOML file with a scenario or a distribution of your own to learn from; by default the package's seas."""
+    control_period: float = TaskConfig.control_period
     """Control step, s."""
+    episode_duration: float = TaskConfig.episode_duration
+    """s."""
     batch_size: int = 1024
     """Minibatch."""
     learning_rate: float = 1e-3
@@ -59,16 +65,39 @@ class LearningOptions(RunOptions):
         require_integer("seeds", self.seeds, low=1, high=10_000)
         require_choice("observation", self.observation, ("state", "sensors"))
         require_number("control_period", self.control_period, "s", low=0.01, high=2.0)
+        self.config  # noqa: B018 - raises here, before anything is written
         require_integer("batch_size", self.batch_size, low=2, high=10**9)
         require_number("learning_rate", self.learning_rate, "", low=0.0, high=1.0, low_open=True)
         require_number("gamma", self.gamma, "", low=0.0, high=1.0)
         require_integer("hidden", self.hidden, low=1, high=4096)
-        require_number("horizon", self.horizon, "s", low=self.control_period, high=EPISODE_DURATION)
+        require_number("horizon", self.horizon, "s", low=self.control_period, high=self.episode_duration)
         require_number("drift_limit", self.drift_limit, "m", low=0.0, high=1e3, low_open=True)
         require_number("reward_scale", self.reward_scale, "1/m", low=0.0, high=1e6, low_open=True)
         require_integer("eval_scenarios", self.eval_scenarios, low=0, high=10**6)
         require_integer("eval_privileged", self.eval_privileged, low=0, high=10**6)
         require_integer("threads", self.threads, low=1, high=256)
+
+    @cached_property
+    def config(self) -> TaskConfig:
+        """The task."""
+        return TaskConfig(
+            scenario=self.scenarios,
+            control_period=self.control_period,
+            episode_duration=self.episode_duration,
+            observation=self.observation,
+        )
+
+    @property
+    def held_out(self) -> HeldOut:
+        """What the agent is compared on: the same task, held-out scenarios."""
+        own = self.scenarios is not None
+        return HeldOut(
+            scenarios=self.scenarios or self.eval_scenarios,
+            count=self.eval_scenarios if own else None,
+            privileged=self.eval_privileged,
+            control_period=self.control_period,
+            episode_duration=self.episode_duration,
+        )
 
     def rate(self, remaining: float) -> float:
         """Learning rate when a share ``remaining`` of the training is left."""

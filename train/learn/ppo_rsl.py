@@ -22,7 +22,6 @@ from tensordict import TensorDict
 from torch import nn
 
 from aframe_env.cuda.device import open_device
-from aframe_env.scenario import ScenarioDistribution
 from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
 from aframe_env.validation import InvalidValue, require_integer
 from agents.learned.network import Actor
@@ -179,18 +178,11 @@ def build(options: Options) -> Learner:
     """The learner and its rows."""
     torch.manual_seed(options.seed)
     torch.set_num_threads(options.threads)
-    source = ScenarioDistribution()
-    env = AFrameHeaveTorchEnv(
-        options.n_envs,
-        scenario=source,
-        control_period=options.control_period,
-        episode_duration=options.horizon,
-        device=options.device,
-        seed=options.seed,
-    )
+    config = options.config.replaced({"episode_duration": options.horizon})
+    env = AFrameHeaveTorchEnv(options.n_envs, config, device=options.device, seed=options.seed)
     rows = TrainingRows(
         env,
-        TensorStateFeatures(source.crane, options.control_period, cuda=options.device == "cuda"),
+        TensorStateFeatures(config.source.crane, options.control_period, cuda=options.device == "cuda"),
         drift_limit=options.drift_limit,
         reward_scale=options.reward_scale,
         reward_knee=options.reward_knee,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import torch
 from tensordict import TensorDict
 
@@ -11,10 +9,6 @@ from aframe_env import task
 from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
 from agents.learned.tensor_features import TensorStateFeatures
 from train.learn.sb3_env import median_reduction, shaped
-
-_NAMES: Final = [quantity.name for quantity in task.STATE]
-_DEPTH_ERROR: Final = _NAMES.index("depth_error")
-_PULLEY_HEAVE: Final = _NAMES.index("pulley_heave")
 
 
 class TrainingRows:
@@ -37,7 +31,7 @@ class TrainingRows:
         self.num_envs, self.device, self.cfg = env.num_envs, env.device, env.cfg
         self.max_episode_length = env.max_episode_length
         self.quantities: tuple[task.Quantity, ...] = task.STATE
-        self._period = env.cfg.control_period
+        self._period = env.cfg.task.control_period
         self._error_sum, self._still_sum = torch.zeros((2, env.num_envs), dtype=torch.float64, device=self.device)
         self.reset()
 
@@ -67,9 +61,9 @@ class TrainingRows:
         _, rewards, dones, extras = self._env.step(commands)
         final, cost = extras["final_obs"], -rewards.double()
         self._error_sum += cost
-        self._still_sum += final[:, _PULLEY_HEAVE].double().square() * self._period
+        self._still_sum += final[:, task.PULLEY_HEAVE].double().square() * self._period
         rewards = shaped(torch, cost / self._period, self._reward_scale, self._reward_knee).float()
-        drifted = (final[:, _DEPTH_ERROR].abs() > self._drift_limit) & ~dones
+        drifted = (final[:, task.DEPTH_ERROR].abs() > self._drift_limit) & ~dones
         self._env.reset(drifted)
         extras = {"time_outs": extras["time_outs"] | drifted}
         return self.get_observations(), rewards, dones | drifted, extras

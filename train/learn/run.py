@@ -12,7 +12,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
-from aframe_env.scenario.sensors import Sensors
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, serialise
 from agents.learned.features import feature_names
 from train.evaluate.run import evaluate
@@ -57,7 +56,7 @@ def to_policy(learner: Learner, options: LearningOptions) -> tuple[LearnedPolicy
     card = AgentCard(
         algorithm=learner.algorithm,
         observation=options.observation,
-        sensors=Sensors() if options.observation == "sensors" else None,
+        sensors=options.config.sensors,
         features=feature_names(learner.rows.quantities),
         hidden=options.hidden,
         squashed=actor.squashed,
@@ -140,6 +139,5 @@ def _train_one(spec: LearnerSpec, options: LearningOptions, console: Console) ->
         return 130
     if options.eval_scenarios:
         with contextlib.suppress(KeyboardInterrupt):
-            privileged = min(options.eval_privileged, options.eval_scenarios)
-            evaluate(policy, folder, options.eval_scenarios, privileged, console)
+            evaluate(policy, folder, options.held_out, console)
     return 0

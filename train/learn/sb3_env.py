@@ -20,10 +20,10 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv
 
 from aframe_env import task
-from aframe_env.scenario import ScenarioSource
+from aframe_env.config import TaskConfig
 from aframe_env.simulation import Simulation
 from agents.learned.features import LIMIT, STATE_FEATURES, StateFeatures, features_for
-from train.learn.options import EPISODE_DURATION, LearningOptions
+from train.learn.options import LearningOptions
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
@@ -55,11 +55,8 @@ class TrainingVecEnv(VecEnv):
     def __init__(
         self,
         rows: int,
+        config: TaskConfig,
         *,
-        scenario: ScenarioSource | None,
-        observation: task.Observation,
-        control_period: float,
-        episode_duration: float,
         horizon: float,
         drift_limit: float,
         reward_scale: float,
@@ -70,21 +67,16 @@ class TrainingVecEnv(VecEnv):
 
         ``reward_knee`` [m]: beyond it the reward falls with the error's logarithm only.
         """
-        self._simulation = Simulation(
-            rows,
-            scenario=scenario,
-            observation=observation,
-            control_period=control_period,
-            episode_duration=episode_duration,
-        )
-        self._horizon = max(1, round(min(horizon, episode_duration) / control_period))
+        self._simulation = Simulation(rows, config)
+        control_period = self._simulation.control_period
+        self._horizon = max(1, round(min(horizon, config.duration) / control_period))
         self._drift_limit = drift_limit
         self._reward_scale = reward_scale
         self._reward_knee = reward_knee
         self._rng = np.random.default_rng(seed)
         self._commands = np.zeros(rows)
         self._no_infos: list[dict[str, Any]] = [{} for _ in range(rows)]
-        sensors = self._simulation.sensors
+        sensors = config.sensors
         self._features = features_for(rows, control_period, sensors)
         self.actor_inputs = len(self._features.names)
         """Of the observation's features, so many are the agent's; the rest is for the critics."""
@@ -104,7 +96,7 @@ class TrainingVecEnv(VecEnv):
     @property
     def quantities(self) -> tuple[task.Quantity, ...]:
         """What an observation of the environment consists of."""
-        return self._simulation.quantities
+        return self._simulation.config.quantities
 
     def pop_reduction(self) -> float:
         """Median over the rows of the heave reduction since the last call, exploration included."""
@@ -128,13 +120,13 @@ class TrainingVecEnv(VecEnv):
         simulation.advance(self._commands)
         cost = simulation.results[:, task.COST]
         self._error_sum += cost
-        self._still_sum += np.square(simulation.state[:, 6]) * simulation.control_period
+        self._still_sum += np.square(simulation.state[:, task.PULLEY_HEAVE]) * simulation.control_period
         rewards = shaped(np, cost / simulation.control_period, self._reward_scale, self._reward_knee)
         self._return += rewards
         self._length += 1
         self._left -= 1
         parted = simulation.results[:, task.PARTED] > 0.0
-        drifted = np.abs(simulation.state[:, 0]) > self._drift_limit
+        drifted = np.abs(simulation.state[:, task.DEPTH_ERROR]) > self._drift_limit
         finished = parted | drifted | (self._left <= 0) | (simulation.steps >= simulation.episode_steps)
         self._look()
         infos = self._no_infos
@@ -199,10 +191,7 @@ def make_rows(options: LearningOptions) -> TrainingVecEnv:
     torch.set_num_threads(options.threads)
     return TrainingVecEnv(
         options.n_envs,
-        scenario=None,
-        observation=options.observation,
-        control_period=options.control_period,
-        episode_duration=EPISODE_DURATION,
+        options.config,
         horizon=options.horizon,
         drift_limit=options.drift_limit,
         reward_scale=options.reward_scale,

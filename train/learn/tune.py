@@ -19,24 +19,25 @@ from optuna.storages.journal import JournalFileBackend
 from rich.console import Console
 from rich.progress import Progress
 
-from aframe_env.scenario import Scenario, ScenarioDistribution
+from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.validation import InvalidValue, require_integer
 from agents.policy import DrumStill
-from agents.rollout import HELD_OUT_SEED, run
+from agents.rollout import HELD_OUT_SEED, drawn_scenarios, run
 from train.learn.learner import Search
 from train.learn.registry import find_learner
 from train.learn.run import to_policy
 from train.shared.cli import parse, to_toml
 from train.shared.markdown import table
 from train.shared.run_folder import command_line, user_errors, versions, write_json, write_text
+from train.shared.scenarios import ScenarioOptions
 
 Algorithm = Literal["ppo", "sac"]
 VALIDATION_SEED: Final = 7_000_001
 """Of the scenarios that trials are judged by."""
 
 
-@dataclass(frozen=True)
-class Options:
+@dataclass(frozen=True, kw_only=True)
+class Options(ScenarioOptions):
     """What to search, on how much."""
 
     algorithm: Algorithm = "ppo"
@@ -47,26 +48,25 @@ class Options:
     """Trials in all, those of earlier calls included."""
     timesteps: int | None = None
     """Control steps to learn from in a trial; by default those of a training."""
-    scenarios: int = 200
-    """Validation scenarios."""
+    scenarios: int | Path = 200
+    """How many validation scenarios; or a TOML file with a scenario or a distribution of your own."""
     seed: int = 0
     """Of the search; trial k learns with seed + k, so that no seed is tuned for."""
     out: Path = Path("runs/tune")
     """Output folder, or that of a search to go on with."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         require_integer("trials", self.trials, low=1, high=10**6)
         if self.timesteps is not None:
             require_integer("timesteps", self.timesteps, low=1, high=10**12)
-        require_integer("scenarios", self.scenarios, low=1, high=20_000)
         require_integer("seed", self.seed, low=0, high=2**31)
 
 
-def validation_scenarios(count: int) -> list[Scenario]:
+def validation_scenarios(source: ScenarioSource, count: int) -> list[Scenario]:
     """The first ``count`` of the scenarios that trials are judged by."""
     assert VALIDATION_SEED != HELD_OUT_SEED
-    distribution = ScenarioDistribution()
-    return [distribution.draw(np.random.default_rng([VALIDATION_SEED, i])) for i in range(count)]
+    return drawn_scenarios(source, VALIDATION_SEED, count)
 
 
 def suggest(trial: optuna.Trial, space: Search) -> dict[str, Any]:
@@ -106,8 +106,8 @@ def search(options: Options, console: Console) -> optuna.Study:
     assert spec.search is not None
     space, defaults = spec.search, spec.options()
     names = space.names
-    scenarios = validation_scenarios(options.scenarios)
-    still = run(DrumStill(), scenarios).rms
+    scenarios = validation_scenarios(options.source, options.number)
+    still = run(DrumStill(), scenarios, defaults.config).rms
     storage = optuna.storages.JournalStorage(JournalFileBackend(str(options.out / "journal.log")))
     study = optuna.create_study(
         storage=storage,
@@ -124,11 +124,18 @@ def search(options: Options, console: Console) -> optuna.Study:
         changes = suggest(trial, space)
         seed = options.seed + trial.number
         timesteps = options.timesteps or defaults.timesteps
-        chosen = replace(defaults, **changes, observation=options.observation, seed=seed, timesteps=timesteps)
+        chosen = replace(
+            defaults,
+            **changes,
+            scenarios=options.scenarios if isinstance(options.scenarios, Path) else None,
+            observation=options.observation,
+            seed=seed,
+            timesteps=timesteps,
+        )
         learner = spec.build(chosen)
         learner.model.learn(timesteps)
         policy, _ = to_policy(learner, chosen)
-        reduction = 1.0 - run(policy, scenarios, observation=options.observation).rms / still
+        reduction = 1.0 - run(policy, scenarios, chosen.config).rms / still
         trial.set_user_attr("seed", seed)
         trial.set_user_attr("fifth", float(np.quantile(reduction, 0.05)))
         return float(np.median(reduction))

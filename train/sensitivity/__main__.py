@@ -36,7 +36,14 @@ def main() -> int:
         names = [name for name in options.policies if name in TUNED]
         try:
             with Progress(console=console) as bars:
-                tuned = tune(names, assumed, optimiser=options.optimiser, workers=options.workers, progress=bars)
+                tuned = tune(
+                    names,
+                    assumed,
+                    options.config.duration,
+                    optimiser=options.optimiser,
+                    workers=options.workers,
+                    progress=bars,
+                )
                 jobs = [Job(name, tuple(tuned.get(name, ())), still, options) for name in options.policies]
                 studies = run_jobs(study, jobs, workers=options.workers, progress=bars, description="policies")
         except KeyboardInterrupt:
@@ -46,7 +53,7 @@ def main() -> int:
         opened.record(options, seed=options.seed)
         draw_curves(folder / "one_at_a_time.png", studies)
         draw_indices(folder / "sobol.png", studies)
-        text = notes(opened.command, options.scenarios, studies)
+        text = notes(opened.command, options.number, studies)
         write_text(folder / "notes.md", text)
         console.print(text, soft_wrap=True, markup=False)
         console.print(f"written: {folder}")

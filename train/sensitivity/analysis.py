@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario
-from aframe_env.task import Observation
 from aframe_env.validation import InvalidValue
 from agents.policy import FloatArray, Knowledge, Policy
 from agents.rollout import run
@@ -56,10 +56,12 @@ class Sensitivity:
     """and worst."""
 
 
-def leftover(policy: Policy, assumed: Sequence[Scenario], still: FloatArray, values: FloatArray) -> FloatArray:
+def leftover(
+    policy: Policy, assumed: Sequence[Scenario], still: FloatArray, config: TaskConfig, values: FloatArray
+) -> FloatArray:
     """RMS depth error over ``still`` (K,) for every row of ``values`` (N, factors) and assumed scenario: (N, K).
 
-    ``still`` is the RMS with the drum still in the K assumed scenarios [m].
+    ``still`` is the RMS with the drum still in the K assumed scenarios [m], ``config`` the task.
     """
     pairs = [(row, k) for row in range(len(values)) for k in range(len(assumed))]
     left = np.empty(len(pairs))
@@ -68,8 +70,8 @@ def leftover(policy: Policy, assumed: Sequence[Scenario], still: FloatArray, val
         truth = [altered(assumed[k], values[row]) for row, k in part]
         which = np.array([k for _, k in part])
         misinformed = Misinformed(policy, assumed, which)
-        observation: Observation = "state" if policy.knows is Knowledge.STATE else "sensors"
-        left[begin : begin + len(part)] = run(misinformed, truth, observation=observation).rms / still[which]
+        seen = config.replaced({"observation": "state" if policy.knows is Knowledge.STATE else "sensors"})
+        left[begin : begin + len(part)] = run(misinformed, truth, seen).rms / still[which]
     return left.reshape(len(values), len(assumed))
 
 
@@ -115,14 +117,20 @@ def sobol_indices(
 
 
 def analyse(
-    policy: Policy, assumed: Sequence[Scenario], still: FloatArray, points: int, samples: int, seed: int
+    policy: Policy,
+    assumed: Sequence[Scenario],
+    still: FloatArray,
+    config: TaskConfig,
+    points: int,
+    samples: int,
+    seed: int,
 ) -> Sensitivity:
     """Everything about one policy."""
 
     joint = np.empty((0, len(assumed)))
 
     def evaluate(values: FloatArray) -> FloatArray:
-        return leftover(policy, assumed, still, values)
+        return leftover(policy, assumed, still, config, values)
 
     def order(values: FloatArray) -> FloatArray:
         nonlocal joint

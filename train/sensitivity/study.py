@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
-from aframe_env.scenario import Scenario, ScenarioDistribution
+from aframe_env.config import TaskConfig
+from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_choice, require_integer
 from agents.drives import map as drive_map
 from agents.drives.map_policy import DriveMapPolicy
@@ -20,13 +22,13 @@ from agents.registry import BuildContext, choose
 from agents.rollout import held_out_scenarios, run
 from train.sensitivity.analysis import Sensitivity, analyse
 from train.shared.run_folder import RunOptions
-from train.shared.tuned_drives import DURATION
+from train.shared.scenarios import ScenarioOptions
 
 STILL, MAP = "drum still", "drive map"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(RunOptions):
+class Options(RunOptions, ScenarioOptions):
     """Which policies, in how many scenarios."""
 
     policies: tuple[str, ...] = (
@@ -40,8 +42,9 @@ class Options(RunOptions):
         "results/agents/sac-sensors",
     )
     """"drum still", "S-Ω1", "S-Ω2", "H-Ω1", "H-Ω2", "drive map", or the folder of an agent."""
-    scenarios: int = 8
-    """Held-out random seas that are assumed."""
+    bounds: ClassVar[tuple[int, int]] = (1, 10_000)
+    scenarios: int | Path = 8
+    """How many held-out scenarios are assumed; or a TOML file with a scenario or a distribution of your own."""
     points: int = 9
     """Values of each factor, one at a time."""
     samples: int = 128
@@ -56,9 +59,9 @@ class Options(RunOptions):
     """Worker processes; by default one for each core."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if not self.policies or len(set(self.policies)) < len(self.policies):
             raise InvalidValue(f"policies = {self.policies}: must be at least one, each named once")
-        require_integer("scenarios", self.scenarios, low=1, high=10_000)
         require_integer("points", self.points, low=2, high=1001)
         require_integer("samples", self.samples, low=2, high=2**20)
         if self.samples & (self.samples - 1):
@@ -68,6 +71,11 @@ class Options(RunOptions):
         for name in self.policies:
             if name not in (STILL, MAP, *TUNED) and choose(name).for_each_scenario:
                 raise InvalidValue(f"policies: {name!r}: is optimised for each scenario as S-Ω1 and its like are here")
+
+    @property
+    def config(self) -> TaskConfig:
+        """The task."""
+        return TaskConfig(scenario=self.source)
 
 
 @dataclass(frozen=True)
@@ -90,22 +98,23 @@ def _policy(job: Job) -> Policy:
     if job.name in TUNED:
         return DrivePolicy(job.name, job.drives, Knowledge.FUTURE)
     scenarios = assumed_scenarios(job.options)
-    setting = BuildContext(
-        scenarios=scenarios, nominal=ScenarioDistribution().nominal(), episode_duration=DURATION, observation="state"
-    )
-    return choose(job.name).build(setting)
+    source = job.options.source
+    nominal = source if isinstance(source, Scenario) else source.nominal()
+    context = BuildContext(scenarios=scenarios, nominal=nominal, config=job.options.config)
+    return choose(job.name).build(context)
 
 
 def study(job: Job) -> Sensitivity:
     """Everything about one policy."""
     options = job.options
     assumed = assumed_scenarios(options)
-    return analyse(_policy(job), assumed, np.array(job.still), options.points, options.samples, options.seed)
+    still = np.array(job.still)
+    return analyse(_policy(job), assumed, still, options.config, options.points, options.samples, options.seed)
 
 
 def assumed_scenarios(options: Options) -> list[Scenario]:
     """What the policies are told."""
-    return held_out_scenarios(ScenarioDistribution(), options.scenarios)
+    return held_out_scenarios(options.source, options.number)
 
 
 def still_rms(assumed: Sequence[Scenario]) -> FloatArray:

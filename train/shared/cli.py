@@ -37,6 +37,9 @@ def to_toml(options: Any) -> str:
 def _converter() -> Converter:
     converter = strict_converter()
     converter.register_structure_hook(Path, lambda value, _: Path(value))
+    converter.register_structure_hook(
+        int | Path, lambda value, _: Path(value) if isinstance(value, str) else converter.structure(value, int)
+    )
     converter.register_unstructure_hook(Path, str)
     return converter
 

@@ -1,10 +1,9 @@
-"""The source's four drives for any number of scenarios, found in parallel."""
+"""The paper's four drives for any number of scenarios, found in parallel."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 from rich.progress import Progress
 
@@ -13,30 +12,30 @@ from agents.drives.optimisation import OptimisedDrive, Optimiser
 from agents.drives.tuned import TUNED, optimised
 from train.shared.jobs import run_jobs
 
-DURATION: Final = 60.0
-
 
 @dataclass(frozen=True)
 class _Job:
     name: str
     scenario: Scenario
+    duration: float
     optimiser: Optimiser
 
 
 def _solve(job: _Job) -> OptimisedDrive:
-    return optimised(TUNED[job.name], DURATION, job.scenario, job.optimiser)
+    return optimised(TUNED[job.name], job.duration, job.scenario, job.optimiser)
 
 
 def tune(
     names: Sequence[str],
     scenarios: Sequence[Scenario],
+    duration: float,
     *,
     optimiser: Optimiser = "nelder-mead",
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> dict[str, list[OptimisedDrive]]:
-    """Drives of those names for each scenario, over ``DURATION`` s."""
-    jobs = [_Job(name, scenario, optimiser) for name in names for scenario in scenarios]
+    """Drives of those names for each scenario, over ``duration`` s."""
+    jobs = [_Job(name, scenario, duration, optimiser) for name in names for scenario in scenarios]
     found = run_jobs(_solve, jobs, workers=workers, progress=progress, description="optimising drives")
     count = len(scenarios)
     return {name: found[i * count : (i + 1) * count] for i, name in enumerate(names)}

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from aframe_env import Crane, HarmonicMotion, Scenario, ScenarioDistribution
+from aframe_env.config import TaskConfig
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.simulation import Simulation
 from agents.learned.features import AUTHORITY, LIMIT, SENSED_FEATURES, STATE_FEATURES, features_for
@@ -12,11 +13,11 @@ PERIOD = 0.1
 def ran(observation, rows=12, steps=400, seed=8):
     """Features and full state, (steps, rows, …), in random seas with the drum turning at random."""
     rng = np.random.default_rng(seed)
-    simulation = Simulation(rows, observation=observation, control_period=PERIOD)
+    simulation = Simulation(rows, TaskConfig(observation=observation, control_period=PERIOD))
     drawn = [simulation.draw(rng) for _ in range(rows)]
     simulation.reset_rows(np.arange(rows), drawn)
     cranes = [scenario.crane for scenario, _ in drawn]
-    features = features_for(rows, PERIOD, simulation.sensors)
+    features = features_for(rows, PERIOD, simulation.config.sensors)
     got, true = [features.start(simulation.observe(), cranes)], [simulation.state.copy()]
     output = np.zeros(rows)
     for _ in range(steps):
@@ -64,7 +65,7 @@ def test_features_are_of_order_one_over_the_distribution(observation):
 
 
 def test_a_row_that_starts_anew_forgets_its_own_past_alone():
-    simulation = Simulation(3, observation="sensors", scenario=ScenarioDistribution(hs=3.0))
+    simulation = Simulation(3, TaskConfig(observation="sensors", scenario=ScenarioDistribution(hs=3.0)))
     rng = np.random.default_rng(1)
     simulation.reset_rows(np.arange(3), [simulation.draw(rng) for _ in range(3)])
     cranes = [Crane()] * 3
@@ -94,10 +95,12 @@ def test_a_row_that_starts_anew_forgets_its_own_past_alone():
 def test_without_output_the_drum_takes_up_the_pulleys_motion(observation):
     """What is left is the drift of many small misses, and the load's bobbing on its rope."""
     rng = np.random.default_rng(3)
-    simulation = Simulation(8, observation=observation, control_period=PERIOD, scenario=ScenarioDistribution(hs=2.0))
+    simulation = Simulation(
+        8, TaskConfig(observation=observation, control_period=PERIOD, scenario=ScenarioDistribution(hs=2.0))
+    )
     drawn = [simulation.draw(rng) for _ in range(8)]
     simulation.reset_rows(np.arange(8), drawn)
-    features = features_for(8, PERIOD, simulation.sensors)
+    features = features_for(8, PERIOD, simulation.config.sensors)
     features.start(simulation.observe(), [scenario.crane for scenario, _ in drawn])
     rope_end, pulley = [], []
     radius = drawn[0][0].crane.winch.drum_radius
@@ -113,7 +116,7 @@ def test_without_output_the_drum_takes_up_the_pulleys_motion(observation):
 def test_an_output_moves_the_ropes_end():
     """At 1 by the authority: a quarter of a second's worth of the winch's greatest acceleration."""
     scenario = Scenario(motion=HarmonicMotion())
-    simulation = Simulation(2, control_period=PERIOD)
+    simulation = Simulation(2, TaskConfig(control_period=PERIOD))
     simulation.reset_rows(np.arange(2), [(scenario, 0)] * 2)
     features = features_for(2, PERIOD, None)
     features.start(simulation.observe(), [scenario.crane] * 2)

@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
+from aframe_env.config import TaskConfig
 from aframe_env.scenario import ScenarioDistribution
 from agents.policy import Knowledge
 from agents.registry import PolicySpec, choose
@@ -20,10 +21,10 @@ from agents.rollout import Episodes, held_out_scenarios
 from train.evaluate.report.data import content, numbers, worst
 from train.evaluate.report.html import figure, percent, write_report
 from train.evaluate.report.remarks import Field, intact, remarks
-from train.evaluate.run import CONTROL_PERIOD, Comparison, HeldOut, run_all
+from train.evaluate.run import Comparison, HeldOut, run_all
 from train.evaluate.statistics import Entry, Interval
 
-STEPS, DURATION = 600, 60.0
+STEPS, DURATION, CONTROL_PERIOD = 600, 60.0, 0.1
 TIME = CONTROL_PERIOD * np.arange(STEPS + 1)
 COMMAND = "python -m train.evaluate --policies 'my_module:<b>&law'"
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -54,7 +55,7 @@ def compared(still, *others):
     entries = [Entry("drum still", Knowledge.NOTHING, still)]
     entries += [Entry(f"policy {i}", knows, policy) for i, (knows, policy) in enumerate(others, 1)]
     scenarios = held_out_scenarios(ScenarioDistribution(), len(still.omega1))
-    return Comparison(tuple(entries), tuple(scenarios), HeldOut(scenarios=len(scenarios), privileged=0))
+    return Comparison(tuple(entries), tuple(scenarios), TaskConfig())
 
 
 @pytest.fixture(scope="module")

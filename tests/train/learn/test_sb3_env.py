@@ -6,25 +6,23 @@ import torch
 from stable_baselines3.common.vec_env import VecEnv
 
 from aframe_env import ScenarioDistribution
+from aframe_env.config import TaskConfig
 from aframe_env.env import AFrameHeaveEnv
 from agents.learned.features import STATE_FEATURES, features_for
 from train.learn import ppo, sac
 from train.learn.sb3_env import TrainingVecEnv
 
 
-def bridge(rows=3, **changes):
-    arguments = {
-        "scenario": None,
-        "observation": "state",
-        "control_period": 0.1,
-        "episode_duration": 60.0,
-        "horizon": 2.0,
-        "drift_limit": 4.0,
-        "reward_scale": 1.0,
-        "seed": 5,
-        **changes,
-    }
-    return TrainingVecEnv(rows, **arguments)
+def bridge(rows=3, *, horizon=2.0, drift_limit=4.0, reward_scale=1.0, reward_knee=np.inf, seed=5, **task):
+    return TrainingVecEnv(
+        rows,
+        TaskConfig(**task),
+        horizon=horizon,
+        drift_limit=drift_limit,
+        reward_scale=reward_scale,
+        reward_knee=reward_knee,
+        seed=seed,
+    )
 
 
 def test_rows_are_the_environments():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from aframe_env import Harmonic, HarmonicMotion, Scenario, ScenarioDistribution
+from aframe_env.config import TaskConfig
 from aframe_env.task import SENSED, STATE
 from agents.drives.functions import RampedDrive
 from agents.drives.policy import Follower
@@ -125,7 +126,7 @@ def test_a_wrong_phase_leaves_twice_the_sine_of_half_of_it():
     still = run(DrumStill(), [assumed]).rms
     values = np.tile(NOMINAL, (3, 1))
     values[:, 5] = 0.0, 0.2, -0.4
-    left = leftover(Ideal(), [assumed], still, values)[:, 0]
+    left = leftover(Ideal(), [assumed], still, TaskConfig(), values)[:, 0]
     assert left[0] < 0.01
     np.testing.assert_allclose(left[1:], 2.0 * np.sin([0.1, 0.2]), rtol=0.03)
 

@@ -15,7 +15,7 @@ from agents.policy import FloatArray, Knowledge
 from agents.rollout import Episodes
 from train.evaluate.episode_table import Traits
 from train.evaluate.report.remarks import Field, intact, remarks
-from train.evaluate.run import CONTROL_PERIOD, Comparison
+from train.evaluate.run import Comparison
 from train.evaluate.statistics import Entry, Interval, Row, compare, reductions
 
 Numbers = list[float]
@@ -187,7 +187,7 @@ def content(comparison: Comparison) -> Content:
     reference = _reference(entries, left)
     field = Field.of(comparison)
     return Content(
-        control_period=CONTROL_PERIOD,
+        control_period=comparison.still.control_period,
         policies=[
             PolicyCard(entry.policy, entry.knows.value, entry.knows is Knowledge.FUTURE, len(values))
             for entry, values in zip(entries, left, strict=True)
@@ -259,7 +259,7 @@ def _subset(label: str, entries: Sequence[Entry], figures: list[Row]) -> Subset:
         label=label,
         figures=figures,
         profiles=[_profile(1.0 - reductions(entry, still)) for entry in entries],
-        spectra=[_spectrum(entry.episodes.error) for entry in entries],
+        spectra=[_spectrum(entry.episodes.error, still.control_period) for entry in entries],
     )
 
 
@@ -273,9 +273,9 @@ def _profile(left: FloatArray) -> Curve:
     return Curve(significant(np.sort(left)[kept]), significant((kept + 1) / len(left)))
 
 
-def _spectrum(error: npt.NDArray[np.float32]) -> Curve:
+def _spectrum(error: npt.NDArray[np.float32], control_period: float) -> Curve:
     samples = min(SPECTRUM_SAMPLES, error.shape[1])
-    frequency, density = welch(error.astype(np.float64), fs=1.0 / CONTROL_PERIOD, nperseg=samples, axis=1)
+    frequency, density = welch(error.astype(np.float64), fs=1.0 / control_period, nperseg=samples, axis=1)
     return Curve(significant(frequency[1:]), significant(np.median(density, axis=0)[1:]))
 
 

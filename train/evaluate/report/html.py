@@ -19,7 +19,6 @@ from train.evaluate.report.data import Content, Subset, content
 from train.evaluate.run import Comparison
 from train.evaluate.statistics import Row
 from train.shared.run_folder import versions, write_text
-from train.shared.tuned_drives import DURATION
 
 MODELS: Final = {"simplified": "simplified (rigid frame)", "rfem": "full (flexible frame, rigid finite elements)"}
 KINDS: Final = (Knowledge.STATE, Knowledge.SENSORS, Knowledge.CLOCK, Knowledge.NOTHING, Knowledge.FUTURE)
@@ -48,9 +47,9 @@ def _page(comparison: Comparison, command: str) -> str:
     return environment.get_template("page.html.j2").render(
         command=command,
         versions=versions(),
-        model=MODELS[comparison.held_out.model],
-        modes=comparison.held_out.rfem_modes,
-        duration=DURATION,
+        model=MODELS[comparison.config.model],
+        modes=comparison.config.rfem_modes,
+        duration=comparison.config.duration,
         count=len(comparison.scenarios),
         ranges=_ranges(shown),
         content=shown,

@@ -11,7 +11,7 @@ from scipy.signal import detrend, periodogram
 from agents.policy import FloatArray
 from agents.rollout import Episodes
 from train.evaluate.episode_table import Traits
-from train.evaluate.run import CONTROL_PERIOD, Comparison
+from train.evaluate.run import Comparison
 
 TAIL: Final = 0.05
 """Share of the scenarios at either end that counts as the roughest, the calmest, the shortest."""
@@ -63,7 +63,7 @@ def _percent(share: float) -> str:
 def _rope(episodes: Episodes, index: int) -> list[str]:
     found = []
     if episodes.parted[index]:
-        time = CONTROL_PERIOD * intact(episodes, index)
+        time = episodes.control_period * intact(episodes, index)
         found.append(f"The rope parted at {time:.1f} s and the load was lost; Ω1 and Ω2 have its free fall in them.")
     events = int(episodes.slack_events[index])
     if events:
@@ -75,7 +75,7 @@ def _winch(comparison: Comparison, episodes: Episodes, index: int) -> list[str]:
     winch = comparison.scenarios[index].crane.winch
     speed = episodes.drum_speed[index, : intact(episodes, index)].astype(np.float64)
     at_speed = float(np.mean(abs(speed) > 0.999 * winch.max_speed))
-    at_acceleration = float(np.mean(abs(np.diff(speed)) > 0.999 * winch.max_acceleration * CONTROL_PERIOD))
+    at_acceleration = float(np.mean(abs(np.diff(speed)) > 0.999 * winch.max_acceleration * episodes.control_period))
     found = []
     if at_speed > AT_LIMIT:
         found.append(
@@ -116,10 +116,10 @@ def _residual(episodes: Episodes, traits: Traits, index: int) -> list[str]:
     if mean**2 > 0.5 * total / len(error):
         standing = f"{100 * mean:+.1f}".replace("-", "−")
         found.append(f"Most of the error is a standing one, {standing} cm in the mean.")
-    early = float(square[: round(START / CONTROL_PERIOD)].sum()) / total
+    early = float(square[: round(START / episodes.control_period)].sum()) / total
     if early > 0.5:
         found.append(f"{_percent(early)} of Ω1 comes from the first {START:g} s: the start.")
-    frequency, density = periodogram(detrend(error), fs=1.0 / CONTROL_PERIOD, window="hann")
+    frequency, density = periodogram(detrend(error), fs=1.0 / episodes.control_period, window="hann")
     peak = 1.0 / float(frequency[1 + np.argmax(density[1:])])
     if abs(peak - traits.rope_period) < NEAR * traits.rope_period:
         found.append(

@@ -1,0 +1,86 @@
+"""What fixes a task: the arguments that every face of the environment takes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from aframe_env import task
+from aframe_env.flexible_engine import Mesh, mesh_of
+from aframe_env.scenario import ScenarioDistribution, ScenarioSource, Sensors
+from aframe_env.scenario.file import scenario_source
+from aframe_env.validation import InvalidValue, require_choice, require_number
+
+Model = Literal["simplified", "rfem"]
+MODELS: Final = ("simplified", "rfem")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskConfig:
+    """The task that a face of the environment poses; :class:`aframe_env.env.AFrameHeaveEnv` says what each field means.
+
+    Raises ``InvalidValue`` for what the model cannot take.
+    """
+
+    model: Model = "simplified"
+    scenario: ScenarioSource | str | Path | Mapping[str, Any] | None = None
+    """A scenario, a distribution, or either as a TOML file or as what such a file says; None: the default seas."""
+    control_period: float = 0.1
+    """s."""
+    episode_duration: float = 60.0
+    """s."""
+    observation: task.Observation = "state"
+    max_inner_step: float | None = None
+    """s."""
+    rfes: tuple[int, int] | None = None
+    rfem_modes: int | None = None
+    source: ScenarioSource = field(init=False, repr=False, compare=False)
+    """``scenario``, read."""
+    mesh: Mesh | None = field(init=False, repr=False, compare=False)
+    """Of the full model; None for the simplified one."""
+
+    def __post_init__(self) -> None:
+        require_choice("model", self.model, MODELS)
+        require_number("control_period", self.control_period, "s", low=1e-3, high=2.0)
+        require_number("episode_duration", self.episode_duration, "s", low=self.control_period, high=1e6)
+        if not isinstance(self.observation, Sensors):
+            require_choice("observation", self.observation, ("state", "sensors"))
+        object.__setattr__(self, "source", scenario_source(self.scenario))
+        object.__setattr__(self, "mesh", mesh_of(self.model, self.rfes, self.rfem_modes))
+
+    @property
+    def steps(self) -> int:
+        """Control steps of an episode."""
+        return max(1, math.ceil(self.episode_duration / self.control_period - 1e-9))
+
+    @property
+    def duration(self) -> float:
+        """``episode_duration`` in whole control steps, s."""
+        return self.steps * self.control_period
+
+    @property
+    def sensors(self) -> Sensors | None:
+        """What measures the observation; None where the full state is observed."""
+        if isinstance(self.observation, Sensors):
+            return self.observation
+        if self.observation == "state":
+            return None
+        return self.source.sensors if isinstance(self.source, ScenarioDistribution) else Sensors()
+
+    @property
+    def quantities(self) -> tuple[task.Quantity, ...]:
+        """What is observed."""
+        return task.STATE if self.sensors is None else task.SENSED
+
+    def replaced(self, arguments: Mapping[str, Any]) -> TaskConfig:
+        """Return the same task but for these fields."""
+        unknown = sorted(set(arguments) - _FIELDS)
+        if unknown:
+            raise InvalidValue(f"unknown argument {unknown[0]!r}: must be one of {', '.join(sorted(_FIELDS))}")
+        return replace(self, **arguments)
+
+
+_FIELDS: Final = frozenset(name for name, each in TaskConfig.__dataclass_fields__.items() if each.init)

@@ -1,0 +1,42 @@
+"""``--scenarios``: how many scenarios a command works on, and what they are drawn from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import ClassVar
+
+from aframe_env.scenario import ScenarioSource
+from aframe_env.scenario.file import scenario_source
+from aframe_env.validation import InvalidValue, require_integer
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScenarioOptions:
+    """How many scenarios, and what they are drawn from."""
+
+    bounds: ClassVar[tuple[int, int]] = (1, 10**6)
+    """Fewest and most scenarios that the command works on."""
+    scenarios: int | Path = 200
+    """How many scenarios; or a TOML file with a scenario or a distribution of your own to take them from."""
+    count: int | None = None
+    """How many scenarios of the file that --scenarios names; by default as many as without a file."""
+
+    def __post_init__(self) -> None:
+        if self.count is not None and not isinstance(self.scenarios, Path):
+            raise InvalidValue(f"count = {self.count}: goes with a file, as in --scenarios FILE.toml --count 100")
+        low, high = self.bounds
+        require_integer("scenarios" if self.count is None else "count", self.number, low=low, high=high)
+
+    @property
+    def number(self) -> int:
+        """How many scenarios."""
+        if not isinstance(self.scenarios, Path):
+            return self.scenarios
+        return type(self).scenarios if self.count is None else self.count  # type: ignore[return-value]
+
+    @cached_property
+    def source(self) -> ScenarioSource:
+        """What scenarios are drawn from; raises ``InvalidValue`` where the file is wrong."""
+        return scenario_source(self.scenarios if isinstance(self.scenarios, Path) else None)
