@@ -28,6 +28,7 @@ class ScenarioOptions:
             raise InvalidValue(f"count = {self.count}: goes with a file, as in --scenarios FILE.toml --count 100")
         low, high = self.bounds
         require_integer("scenarios" if self.count is None else "count", self.number, low=low, high=high)
+        self.source  # noqa: B018 - read here, before anything is written
 
     @property
     def number(self) -> int:
