@@ -1,4 +1,4 @@
-"""The source's "map of basic drive functions": stored optimal drives, approximated in between.
+"""The paper's "map of basic drive functions": stored optimal drives, approximated in between.
 
 Each node of the map is one regular heave of the crane's tip, a load and a rope; stored is the best pseudo-harmonic
 drive for it, as the complex ratio of the rope that it pays out to that heave (its argument is the lead of the drive).

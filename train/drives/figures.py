@@ -1,4 +1,4 @@
-"""Pictures of an experiment with drives, of the kinds of the source's figures 14-18."""
+"""Pictures of an experiment with drives, of the kinds of the paper's figures 14-18."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class SummaryRow:
 
     @property
     def label(self) -> str:
-        """The source's name for it, as in S-Ω1."""
+        """The paper's name for it, as in S-Ω1."""
         return "drum still" if self.objective is None else f"{self.drive[0].upper()}-Ω{self.objective[-1]}"
 
     @property
