@@ -78,11 +78,11 @@ class FadingPolynomial:
 
     def advance(self, signal: FloatArray) -> None:
         """Take the signal (N,) a control step later."""
-        value, slope, bend = self._terms
-        value, slope = value + slope + bend, slope + 2.0 * bend
+        value, slope, quadratic = self._terms
+        value, slope = value + slope + quadratic, slope + 2.0 * quadratic
         innovation = signal - value
         a, b, c = self._gains
-        self._terms = np.stack([value + a * innovation, slope + b * innovation, bend + c * innovation])
+        self._terms = np.stack([value + a * innovation, slope + b * innovation, quadratic + c * innovation])
 
     def value(self, rows: Rows) -> FloatArray:
         """The signal, smoothed."""
@@ -92,7 +92,7 @@ class FadingPolynomial:
         """Its first derivative, 1/s."""
         return np.asarray(self._terms[1, rows] / self._period)
 
-    def bend(self, rows: Rows) -> FloatArray:
+    def second_derivative(self, rows: Rows) -> FloatArray:
         """Its second derivative, 1/s²."""
         return np.asarray(2.0 * self._terms[2, rows] / self._period**2)
 
@@ -148,7 +148,7 @@ class Estimator:
             depth_error=self._position[rows],
             pulley_velocity=self._heave.value(rows),
             pulley_acceleration=self._heave.rate(rows),
-            pulley_jerk=self._heave.bend(rows),
+            pulley_jerk=self._heave.second_derivative(rows),
             load_velocity=self._velocity[rows],
             stretch=self._rope_end[rows] - self._position[rows],
         )

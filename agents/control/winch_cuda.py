@@ -27,7 +27,7 @@ def _kernel() -> Any:
     return cuda.jit(invert)
 
 
-def find_commands(winch: Winch, period: float, turn: torch.Tensor, speed: torch.Tensor) -> torch.Tensor:
+def invert_winches(winch: Winch, period: float, turn: torch.Tensor, speed: torch.Tensor) -> torch.Tensor:
     """Commands (N,) rad/s that turn equal winches by ``turn`` (N,) rad in ``period`` s, or as near as may be.
 
     ``speed`` (N,) rad/s: the drums' speed now. All float64, on one device.

@@ -1,6 +1,6 @@
 """Open-loop drives: the drum angle as a function of time, φ_H(t) with φ_H(0) = 0.
 
-The source's eqs. (33)-(36) name a cubic spline and a "pseudo-harmonic" function and their decision variables;
+The paper's eqs. (33)-(36) name a cubic spline and a "pseudo-harmonic" function and their decision variables;
 its exact text is not available to us. Each class below says which form it takes.
 """
 
@@ -202,7 +202,7 @@ def harmonic_samples(variables: FloatArray, times: FloatArray) -> tuple[FloatArr
     return angle, speed
 
 
-def harmonic_tangents(variables: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+def harmonic_jacobian(variables: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Derivatives (T, 3 n) of angle and speed of the ``HarmonicDrive`` by its variables."""
     a, w, p = variables.reshape(-1, 3).T
     t = times[:, None]

@@ -1,6 +1,6 @@
 """Objectives (31) and (32) of a prescribed drum angle, evaluated by the package's own integrator.
 
-Ω1 = ∫ (x_L3 - h)² dt [m² s], Ω2 = max |x_L3 - h| [m] over [0, t_k] on the simplified model. As in the source,
+Ω1 = ∫ (x_L3 - h)² dt [m² s], Ω2 = max |x_L3 - h| [m] over [0, t_k] on the simplified model. As in the paper,
 the drum follows the drive exactly: the winch has no limits here, and the rope does not part.
 """
 
@@ -194,7 +194,7 @@ class Objective:
         self.evaluate(angle, speed)
         return self._errors.copy()
 
-    def errors_beside(
+    def perturbed_errors(
         self, angle: FloatArray, speed: FloatArray, more_angle: FloatArray, more_speed: FloatArray
     ) -> FloatArray:
         """x_L3 - h (steps + 1, n) m of n neighbours of a drive: ``more_angle``, ``more_speed`` (times, n) are added.

@@ -25,8 +25,8 @@ from agents.drives.functions import (
     Drive,
     HarmonicDrive,
     SplineDrive,
+    harmonic_jacobian,
     harmonic_samples,
-    harmonic_tangents,
     spline_matrices,
     uniform_harmonic_samples,
 )
@@ -124,7 +124,7 @@ def optimise(
     coarse = Objective(scenario, duration, coarse_step(scenario))
     guess = _spline_guess(coarse, intervals, given) if family == "spline" else _harmonic_guess(coarse, harmonics, given)
     first = max_evaluations if objective == "omega1" else max(1, max_evaluations // 2)
-    search = _Search(coarse, max_evaluations, np.random.default_rng(seed), progress)
+    search = _Search(coarse, np.random.default_rng(seed), progress)
     if optimiser == "gauss-newton":
         x, search.evaluations = _gauss_newton(coarse, guess, first, progress)
     else:
@@ -157,7 +157,7 @@ class _Guess:
     """What moves about one metre of rope, for each variable."""
     sample: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
     """Angle and speed (T,) of a drive at the objective's times, from its variables (n,)."""
-    tangents: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+    jacobian: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
     """Their derivatives (T, n) by the variables."""
 
 
@@ -170,7 +170,7 @@ def _spline_guess(objective: Objective, intervals: int, given: FloatArray | None
         x=np.asarray(x, dtype=np.float64),
         scale=scale,
         sample=lambda v: (angle @ v, speed @ v),
-        tangents=lambda v: (angle, speed),
+        jacobian=lambda v: (angle, speed),
     )
 
 
@@ -189,7 +189,7 @@ def _harmonic_guess(objective: Objective, harmonics: int, given: FloatArray | No
         x=x,
         scale=scale,
         sample=lambda v: uniform_harmonic_samples(v, step, count),
-        tangents=lambda v: harmonic_tangents(v, times),
+        jacobian=lambda v: harmonic_jacobian(v, times),
     )
 
 
@@ -202,7 +202,7 @@ def _fitted_harmonics(times: FloatArray, needed: FloatArray, harmonics: int) -> 
         return harmonic_samples(v, t)[0] - y
 
     def jacobian(v: FloatArray) -> FloatArray:
-        return harmonic_tangents(v, t)[0]
+        return harmonic_jacobian(v, t)[0]
 
     x = np.empty(0)
     for _ in range(harmonics):
@@ -257,9 +257,9 @@ def _gauss_newton(
         nonlocal evaluations
         evaluations += size
         angle, speed = guess.sample(variables(y))
-        more = [_NEIGHBOUR * guess.scale * each for each in guess.tangents(variables(y))]
-        beside = objective.errors_beside(angle, speed, *more)
-        return np.asarray(weight[:, None] * (beside - objective.errors(angle, speed)[:, None]) / _NEIGHBOUR)
+        more = [_NEIGHBOUR * guess.scale * each for each in guess.jacobian(variables(y))]
+        perturbed = objective.perturbed_errors(angle, speed, *more)
+        return np.asarray(weight[:, None] * (perturbed - objective.errors(angle, speed)[:, None]) / _NEIGHBOUR)
 
     found = least_squares(
         error,
@@ -276,10 +276,9 @@ def _gauss_newton(
 class _Search:
     """Nelder-Mead with restarts, counting its evaluations."""
 
-    def __init__(self, objective: Objective, budget: int, rng: np.random.Generator, progress: Progress | None) -> None:
+    def __init__(self, objective: Objective, rng: np.random.Generator, progress: Progress | None) -> None:
         self.objective = objective
         self.evaluations = 0
-        self._budget = budget
         self._rng = rng
         self._progress = progress
 

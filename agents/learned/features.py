@@ -136,7 +136,7 @@ class SensedFeatures:
             *_of_the_load(np, depth_error, load_velocity, rope_end - depth_error),
             10.0 * rope_end_speed,
             velocity[0],
-            self._pulley.rate(rows) + self._ahead * self._pulley.bend(rows),
+            self._pulley.rate(rows) + self._ahead * self._pulley.second_derivative(rows),
             soon,
             later,
             *_of_the_lift(o, hoists.frequency[rows]),

@@ -67,7 +67,7 @@ def filled() -> Measurement:
     none = np.zeros((len(angle), LANES))
 
     def together() -> FloatArray:
-        errors = objective().errors_beside(angle, rate, none, none)
+        errors = objective().perturbed_errors(angle, rate, none, none)
         return np.trapezoid(errors**2, dx=objective().step, axis=0)
 
     return microseconds(together, LANES)
