@@ -1,4 +1,4 @@
-"""The frame as a set of rfes and sdes: right leg, top beam and left leg as one chain, eqs. (8)–(22).
+"""The frame as a set of rfes and sdes: right leg, top beam and left leg, eqs. (8)–(22).
 
 Every rfe has six generalised coordinates, eq. (9): the displacement of its centre of mass and a small
 rotation, both along its own undeformed principal central axes (needed for the mass matrix (14) to be
@@ -238,4 +238,29 @@ def one_chain(frame: Frame, division: Division, *, corrected_shear: bool = False
         spring_bodies=tuple((index, index + 1) for index in range(len(springs))),
         joints=(),
         points=named_points(frame, bodies, corners, corners),
+    )
+
+
+def three_beams(frame: Frame, division: Division, *, corrected_shear: bool = False) -> Structure:
+    """The paper's previous model: right leg, top beam and left leg, each a beam of its own with n + 1 rfes.
+
+    It has the same sdes as ``one_chain``; the corner rfes are split in two halves that a rigid joint at B_R and B_L
+    (six reactions each) holds together.
+    """
+    bodies: list[Body] = []
+    springs: list[Spring] = []
+    pairs: list[tuple[int, int]] = []
+    for segments, joined in divided_members(frame, division, corrected_shear):
+        first = len(bodies)
+        bodies += [body_of((segment,)) for segment in segments]
+        springs += joined
+        pairs += [(first + index, first + index + 1) for index in range(len(joined))]
+    leg_end, beam_end = division.leg, division.leg + division.beam + 1
+    joints = [(end, end + 1, bodies[end + 1].segments[0].point(0.0)) for end in (leg_end, beam_end)]
+    return Structure(
+        bodies=tuple(bodies),
+        springs=tuple(springs),
+        spring_bodies=tuple(pairs),
+        joints=tuple(joints),
+        points=named_points(frame, bodies, (leg_end, beam_end + 1), (leg_end + 1, beam_end)),
     )

@@ -9,8 +9,10 @@ from typing import Literal
 
 from rich.progress import Progress
 
+from aframe_env.rfem.simulate import Drum, DynamicCase, PrescribedDrum, StillDrum, simulate
 from aframe_env.scenario import Initial, Scenario
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
+from agents.drives.functions import Drive
 from agents.drives.objectives import FINE_STEP, Objective, coarse_step
 from agents.drives.optimisation import (
     FAMILIES,
@@ -23,11 +25,15 @@ from agents.drives.optimisation import (
     required_angle,
 )
 from agents.drives.optimisation import Progress as SearchProgress
-from train.drives.full_model import transfer
+from agents.policy import FloatArray
 from train.drives.notes import Variant
-from train.drives.results import Experiment, Result, SummaryRow
+from train.drives.results import Experiment, Result, SummaryRow, Transfer
 from train.shared.run_folder import RunOptions
 
+STEP = 2.5e-3
+"""Step of the full model, s."""
+OUTPUT_INTERVAL = 0.01
+"""Of the full model's runs, s."""
 PAPER_DAMPING_RATIO = 0.03
 """Damping of the load's bobbing on the rope in ``--case paper``, share of critical: the middle of the range that
 scenarios are drawn from. The paper states no figure."""
@@ -143,6 +149,26 @@ def checked(scenario: Scenario, duration: float, experiment: Experiment, bars: P
         results.append(replace(result, full=transfer(scenario, duration, result)))
         bars.advance(bar)
     return replace(experiment, results=tuple(results))
+
+
+def transfer(scenario: Scenario, duration: float, result: Result) -> Transfer:
+    """Run a drive, or the drum still, in the full model for ``duration`` s; the drum follows the drive exactly."""
+    case = DynamicCase(
+        scenario=scenario,
+        drum=StillDrum() if result.drive is None else _prescribed(result.drive),
+        duration=duration,
+        step=STEP,
+        output_interval=OUTPUT_INTERVAL,
+    )
+    run = simulate(case)
+    return Transfer(run.time, run.load[:, 2] - scenario.target_level)
+
+
+def _prescribed(drive: Drive) -> Drum:
+    def at(function: Callable[[float], FloatArray]) -> Callable[[float], float]:
+        return lambda time: float(function(min(time, drive.duration)))
+
+    return PrescribedDrum(angle=at(drive.angle), rate=at(drive.speed))
 
 
 def variants(options: Options, bars: Progress) -> list[Variant]:
