@@ -10,7 +10,7 @@ behind the cut exerts on the part before it: N > 0 is tension.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,8 +18,6 @@ import numpy as np
 from aframe_env.rfem.beam import Array, Segment
 from aframe_env.rfem.model import FrameModel
 from aframe_env.scenario.cross_sections import GivenSection
-
-COMPONENTS = ("N", "V2", "V3", "T", "M2", "M3")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,9 +139,3 @@ def von_mises(section: GivenSection, forces: Array) -> Array:
         tau = shear2 * point.shear_2 + shear3 * point.shear_3 + torque * point.torsion
         worst = np.maximum(worst, np.sqrt(sigma**2 + 3.0 * tau**2))
     return worst
-
-
-def by_name(values: Array, names: Mapping[str, int] | None = None) -> dict[str, float]:
-    """N, V2, … → value; ``names`` picks and renames components."""
-    chosen = names or {name: index for index, name in enumerate(COMPONENTS)}
-    return {name: float(values[index]) for name, index in chosen.items()}

@@ -11,7 +11,7 @@ import numpy as np
 from aframe_env.rfem.banded import BandedCholesky
 from aframe_env.rfem.beam import Array
 from aframe_env.rfem.model import DOWN, FrameModel, frame_model
-from aframe_env.rfem.section_forces import COMPONENTS, Cut, PointForce, SectionForces, von_mises
+from aframe_env.rfem.section_forces import Cut, PointForce, SectionForces, von_mises
 from aframe_env.rfem.structure import members_of
 from aframe_env.scenario.crane import GRAVITY, Vector
 from aframe_env.validation import InvalidValue, require_choice, require_number, require_vector
@@ -255,6 +255,3 @@ def static(crane: Crane, case: LoadCase, *, model: FrameModel | None = None) -> 
         rotation={name: to_deck @ structure.rotation(name) @ position for name in names},
         section_forces=SectionForces(frame, position, acting, field_strength * (to_deck.T @ DOWN)),
     )
-
-
-__all__ = ["COMPONENTS", "LoadCase", "StaticResult", "Station", "static"]

@@ -152,9 +152,6 @@ def determinate_reactions() -> Check:
     )
 
 
-_VECTORS = ("u_S_D", "u_BR_D", "u_BL_D", "rot_S_D", "rot_BR_D", "rot_BL_D", "R_AR_D", "R_AL_D")
-
-
 def static_errors(frame: FrameModel, name: str) -> dict[str, float]:
     """Relative errors of a load case against the finite-element program."""
     here, target = static(Crane(), CASES[name], model=frame).reference_case(), static_cases()[name]
