@@ -1,4 +1,4 @@
-"""Energy balance of a run: what deck and drum put in, what frame, rope and load hold, what is lost."""
+"""Energy balance of a run: work of deck and drum, energy of frame, rope and load, and dissipation."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class EnergyBalance:
     """Work of the deck on feet, servomotors and drum, of the drum's drive, and of servomotors that change their
     length, (k,)."""
     dissipated: Array
-    """By the frame's material, servomotors and rope, (k,)."""
+    """Dissipation in the frame's material, servomotors and rope, (k,)."""
 
     @property
     def error(self) -> float:

@@ -1,4 +1,4 @@
-"""Section forces along the frame, and the stress they make.
+"""Section forces along the frame, and their stress.
 
 At an sde the section forces are its own forces. Anywhere inside an rfe they follow from the equilibrium of
 the part of the rfe between the sde before it and the cut, under its distributed weight and the point forces
@@ -22,14 +22,14 @@ from aframe_env.scenario.cross_sections import GivenSection
 
 @dataclass(frozen=True, kw_only=True)
 class Cut:
-    """Where the frame is cut."""
+    """A cut through the frame."""
 
     member: int
     """0 right leg, 1 top beam, 2 left leg."""
     position: float
-    """From the member's first end along the chain, m."""
+    """Distance from the member's first end along the chain, m."""
     behind_point: bool = True
-    """With a point force just there: cut behind it (True) or before it (False)."""
+    """Side of a point force just there: cut behind it (True) or before it (False)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,9 +38,9 @@ class PointForce:
 
     member: int
     position: float
-    """From the member's first end, m."""
+    """Distance from the member's first end, m."""
     force: Array
-    """In {F}, (3,), N."""
+    """Force in {F}, (3,), N."""
 
 
 class SectionForces:

@@ -29,7 +29,7 @@ of the reference program, whose section forces are constant in an element."""
 
 @dataclass(frozen=True, kw_only=True)
 class LoadCase:
-    """What loads the frame at rest."""
+    """Loads on the frame at rest."""
 
     own_weight: bool = True
     """Own weight of legs and beam."""
@@ -52,11 +52,11 @@ class Station:
     member: str
     """right leg, top beam or left leg."""
     position: float
-    """From the member's first end along the chain A_R → B_R → B_L → A_L, m."""
+    """Distance from the member's first end along the chain A_R → B_R → B_L → A_L, m."""
     along: float
-    """From A_R along the chain, m."""
+    """Distance from A_R along the chain, m."""
     place: Array
-    """In {D}, undeformed, (3,), m."""
+    """Undeformed place in {D}, (3,), m."""
     forces: Array
     """N, V2, V3 (N), T, M2, M3 (N m); (6,)."""
     von_mises: float
@@ -65,7 +65,7 @@ class Station:
 
 @dataclass(frozen=True, kw_only=True)
 class StaticResult:
-    """What a static load case does to the frame. Vectors are along {D}."""
+    """The frame under a static load case. Vectors are along {D}."""
 
     model: FrameModel
     case: LoadCase

@@ -1,4 +1,4 @@
-"""What a frame's present state means: deflection of S, reactions, servomotor forces, utilisation, largest rotation.
+"""Readout of a frame's present state: deflection of S, reactions, servomotor forces, utilisation, largest rotation.
 
 Reactions are R = Pᵀ(K q + L q̇ - f), linear in the modes and in what acts on the frame, see
 ``aframe_env.rfem.constraints``; the tables that say how come from ``aframe_env.rfem.tables``.
@@ -23,7 +23,7 @@ Array = npt.NDArray[np.float64]
 
 # Columns of a readout.
 DEFLECTION: Final = 0
-"""Of S, along {D}, 3, m."""
+"""Deflection of S along {D}, 3, m."""
 FEET: Final = 3
 """Forces on the frame at A_R and A_L, along {D}, 6, N."""
 SERVOMOTORS: Final = 9

@@ -28,7 +28,7 @@ from aframe_env.dynamics.vector import Vector, add, cross, difference, scaled
 Array = npt.NDArray[np.float64]
 
 ITERATIONS: Final = 30
-"""Of the deflection of S, which turns the rope's second leg; each gains three digits or so."""
+"""Iterations of the deflection of S, which turns the rope's second leg; each gains three digits or so."""
 NOTHING: Final = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
