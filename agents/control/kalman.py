@@ -1,4 +1,4 @@
-"""Kalman filters that tell agents, from their sensors, where the load is and where the pulley goes.
+"""Kalman filters that estimate the load's place and predict the pulley's path from the sensors.
 
 Dead reckoning by the heave rate drifts by centimetres, and the depth sensor is too coarse and too slow to hold it. But
 a ship in waves moves within a band of frequencies: ``WaveFilter`` holds its heave as a bank of oscillators of that
@@ -23,7 +23,7 @@ ComplexArray = npt.NDArray[np.complex128]
 
 @dataclass(frozen=True, kw_only=True)
 class WaveBank:
-    """The oscillators, and what the filter counts on."""
+    """Oscillators of the filter, and its noise model."""
 
     lowest: float = 0.3
     """rad/s."""
@@ -33,30 +33,30 @@ class WaveBank:
     damping: float = 0.002
     """Rate at which an oscillator forgets, 1/s."""
     variance: float = 0.06
-    """Of the heave rate, spread evenly over the bands, m²/s²."""
+    """Variance of the heave rate, spread evenly over the bands, m²/s²."""
     build_up: float = 10.0
     """Time over which the motion comes up to that variance at the start of a lift, s."""
     rate_noise: float = 0.01
     """Standard deviation of a reading of the heave rate, m/s."""
     depth_noise: float = 0.06
-    """Standard deviation of a reading of the depth beside what else is estimated, m."""
+    """Standard deviation of a reading of the depth, m."""
     offset_drift: float = 1e-7
     """Variance by which the offset between heave and depth grows, m²/s."""
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """Gains of K control steps; the last ones, a period of the depth sensor, are those of all steps to come."""
+    """Gains of K control steps; those of the last period of the depth sensor repeat from then on."""
 
     rate: ComplexArray
-    """(K, bands + 1) of a reading of the heave rate, on the oscillators and on the offset."""
+    """(K, bands + 1) gains of a reading of the heave rate, on the oscillators and on the offset."""
     depth: ComplexArray
-    """(K, bands + 1) of a reading of the depth; zero where there is none."""
+    """(K, bands + 1) gains of a reading of the depth; zero where there is none."""
     hold: int
     """Control steps between two readings of the depth."""
 
     def index(self, step: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-        """Which gains hold at these steps since the start of a lift."""
+        """Index of the gains at these steps since the start of a lift."""
         beyond = len(self.rate) - self.hold
         return np.where(step < beyond, step, beyond + (step - beyond) % self.hold)
 
@@ -105,7 +105,7 @@ def _exponents(bank: WaveBank) -> ComplexArray:
 
 
 class WaveFilter:
-    """The pulley's heave, and what it will be, for N rows."""
+    """Estimate and prediction of the pulley's heave, for N rows."""
 
     def __init__(self, rows: int, control_period: float, hold: int, bank: WaveBank | None = None) -> None:
         """``hold``: control steps between two readings of the depth."""
@@ -130,7 +130,7 @@ class WaveFilter:
         self._state += innovation[:, None] * self._schedule.rate[self._schedule.index(self._step)]
 
     def correct(self, innovation: FloatArray) -> None:
-        """Take what a reading of the depth misses (N,) m, heeded in the steps that have one."""
+        """Take the innovation (N,) m of the depth; it counts in the steps that have a reading."""
         self._state += innovation[:, None] * self._schedule.depth[self._schedule.index(self._step)]
 
     def heave(self) -> FloatArray:
@@ -138,7 +138,7 @@ class WaveFilter:
         return np.asarray((self._state[:, :-1] / self._exponent).real.sum(axis=1) + self._state[:, -1].real)
 
     def rate(self, times: FloatArray) -> FloatArray:
-        """Velocity (T, N) m/s of the pulley, ``times`` (T,) s after the moment that the reading speaks of."""
+        """Velocity (T, N) m/s of the pulley, ``times`` (T,) s after the latest reading's moment of measurement."""
         return self._sum(np.exp(np.outer(times, self._exponent)))
 
     def path(self, times: FloatArray) -> FloatArray:
@@ -151,7 +151,7 @@ class WaveFilter:
 
 
 ACCELERATION_NOISE = 0.02
-"""m/s², of the load beside what its bobbing explains."""
+"""Process noise of the load's acceleration beside its bobbing, m/s²."""
 
 
 class RopeFilter:
@@ -161,7 +161,7 @@ class RopeFilter:
     """
 
     def __init__(self, rows: int, rate_noise: float) -> None:
-        """``rate_noise`` of a reading of the heave rate, m/s."""
+        """``rate_noise``: standard deviation of a reading of the heave rate, m/s."""
         self._rate_noise = rate_noise
         self._a, self._b = np.zeros((rows, 3, 3)), np.zeros((rows, 3))
         self._process_noise, self._covariance = np.zeros((rows, 3, 3)), np.zeros((rows, 3, 3))
@@ -191,10 +191,10 @@ class RopeFilter:
 
     @property
     def stretch(self) -> FloatArray:
-        """Of the rope beyond that under the load's weight, (N,) m."""
+        """Stretch of the rope beyond that under the load's weight, (N,) m."""
         return np.asarray(self._x[:, 2] - self._x[:, 0])
 
     @property
     def load_velocity(self) -> FloatArray:
-        """(N,) m/s."""
+        """Vertical velocity of the load, (N,) m/s."""
         return np.asarray(self._x[:, 1])

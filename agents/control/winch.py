@@ -1,4 +1,4 @@
-"""The winch inverted: which command turns the drum by a wanted angle during a control step."""
+"""Inverse of the winch: the command that turns the drum by a wanted angle during a control step."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class WinchModel:
         self.speed[rows] = 0.0
 
     def command(self, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Commands (N,) rad/s that turn the drums by ``turn`` (N,) rad, or as near as may be, and how far they turn.
+        """Commands (N,) rad/s that turn the drums by ``turn`` (N,) rad, or as near as may be, and their turns (N,) rad.
 
         The reckoned speed is carried to the end of the control step.
         """
@@ -51,7 +51,7 @@ class WinchModel:
         return command
 
     def turn(self, command: FloatArray) -> FloatArray:
-        """How far the drums turn (N,) rad at these commands (N,) rad/s; the reckoned speed is carried on."""
+        """Turns (N,) rad of the drums at these commands (N,) rad/s; the reckoned speed is carried on."""
         turned = np.empty_like(command)
         limited = np.clip(command, -self.max_speed, self.max_speed)
         _kernels().follow(self.speed, self.max_acceleration, self._lag, self._period, limited, turned)

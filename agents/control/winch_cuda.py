@@ -1,4 +1,4 @@
-"""The winch inverted on a CUDA device, one thread a winch."""
+"""Inverse of the winch on a CUDA device, one thread a winch."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ class Drive(Protocol):
 
     @property
     def duration(self) -> float:
-        """t_k: how long the drive was made for, s."""
+        """Duration t_k that the drive was made for, s."""
         ...
 
     def angle(self, time: npt.ArrayLike) -> FloatArray:
@@ -41,7 +41,7 @@ class Drive(Protocol):
 
     @property
     def variables(self) -> FloatArray:
-        """The vector of decision variables."""
+        """Vector of decision variables."""
         ...
 
 
@@ -203,7 +203,7 @@ def harmonic_samples(variables: FloatArray, times: FloatArray) -> tuple[FloatArr
 
 
 def harmonic_jacobian(variables: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Derivatives (T, 3 n) of angle and speed of the ``HarmonicDrive`` by its variables."""
+    """Jacobians (T, 3 n) of angle and speed of the ``HarmonicDrive`` by its variables."""
     a, w, p = variables.reshape(-1, 3).T
     t = times[:, None]
     argument = w * t + p

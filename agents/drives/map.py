@@ -53,11 +53,11 @@ class Node:
     damping_ratio: float = 0.03
     """Damping of the load's bobbing on the rope, share of critical."""
     periods: float = 6.0
-    """How long the drive is optimised over."""
+    """Duration that the drive is optimised over, in periods."""
 
     @property
     def scenario(self) -> Scenario:
-        """The load starts at rest, under a tip that moves upwards from the middle of its stroke."""
+        """Scenario of the node: the load starts at rest, the tip moving upwards from the middle of its stroke."""
         heave = Harmonic(coordinate="heave", amplitude=self.amplitude, period=self.period)
         level = Scenario().crane.pulley_position[2] - self.length
         case = Scenario(
@@ -75,7 +75,7 @@ class Node:
 
 @dataclass(frozen=True)
 class NodeDrive:
-    """What the optimum of a node is."""
+    """Optimum of a node."""
 
     real: float
     """Real and imaginary part of rope paid out over the tip's heave, both at the heave's frequency."""
@@ -88,7 +88,7 @@ class NodeDrive:
 def optimise_node(node: Node) -> NodeDrive:
     """Find the best pseudo-harmonic drive (one harmonic, Ω1) of a node.
 
-    The search starts well off, with half the heave and 0.3 rad late: what it finds owes nothing to a good guess.
+    The search starts well off, with half the heave and 0.3 rad late: its result owes nothing to a good guess.
     """
     scenario, duration = node.scenario, node.periods * node.period
     radius = scenario.crane.winch.drum_radius
@@ -106,12 +106,12 @@ def optimise_node(node: Node) -> NodeDrive:
 
 @dataclass(frozen=True)
 class MapCard:
-    """What must be known of a map, beside its arrays."""
+    """Description of a map, beside its arrays."""
 
     command: str
     versions: dict[str, str]
     sha256: str
-    """Of the file of arrays."""
+    """sha256 of the file of arrays."""
     format: int = FORMAT
 
 

@@ -33,12 +33,12 @@ FINE_STEP: Final = 0.01
 COARSE_STEP: Final = 0.05
 """Longest inner step while searching, s."""
 COARSE_PHASE: Final = 0.2
-"""Most that the load's bobbing on the rope turns in an inner step while searching, rad."""
+"""Greatest phase of the load's bobbing on the rope in an inner step while searching, rad."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a drive does to the load."""
+    """Result of a drive for the load."""
 
     omega1: float
     """Ω1, m² s."""
@@ -68,7 +68,7 @@ def coarse_step(scenario: Scenario) -> float:
 
 
 class _Drum(NamedTuple):
-    """What turns a drum angle into a rope."""
+    """Constants that turn a drum angle into a length of rope."""
 
     radius: float
     """m."""
@@ -197,9 +197,9 @@ class Objective:
     def perturbed_errors(
         self, angle: FloatArray, speed: FloatArray, more_angle: FloatArray, more_speed: FloatArray
     ) -> FloatArray:
-        """x_L3 - h (steps + 1, n) m of n neighbours of a drive: ``more_angle``, ``more_speed`` (times, n) are added.
+        """x_L3 - h (steps + 1, n) m under n perturbed drives: ``more_angle``, ``more_speed`` (times, n) are added.
 
-        The neighbours run side by side, in the lanes of the processor's registers.
+        They run side by side, in the lanes of the processor's registers.
         """
         errors = np.empty((self.steps + 1, more_angle.shape[1]))
         _lanes_kernel()(self.path, angle, speed, more_angle, more_speed, self._row, self.step, errors)

@@ -51,7 +51,7 @@ _LEAST_SCALE = 0.02  # m of rope: a harmonic smaller than this is scaled as if i
 
 @dataclass(frozen=True, kw_only=True)
 class OptimisedDrive:
-    """A drive, what it was optimised for, and what it does on its scenario (without the winch's limits)."""
+    """A drive, its objective, and its result on its scenario (without the winch's limits)."""
 
     drive: Drive
     family: str
@@ -67,7 +67,7 @@ class OptimisedDrive:
     amplitude: float
     """Greatest distance of the load from its required level, m (equal to Ω2 by its definition)."""
     evaluations: int
-    """Times that an objective was evaluated while searching, a start from the Ω1 optimum included."""
+    """Number of evaluations of an objective while searching, a start from the Ω1 optimum included."""
     seconds: float
     """Wall-clock time of the search."""
 
@@ -76,7 +76,7 @@ def required_angle(objective: Objective) -> FloatArray:
     """Drum angle [rad] at the objective's times that would hold the load at h right below where the ship rests.
 
     The rope's law solved for the unstretched length at a tension equal to the weight: what remains to be found by
-    optimisation is the pendulum's share, the start's transient, and what the family of drives can not follow.
+    optimisation is the pendulum's share, the start's transient, and the part that the family of drives cannot follow.
     """
     scenario = objective.scenario
     crane = scenario.crane
@@ -149,16 +149,16 @@ def optimise(
 
 @dataclass(frozen=True)
 class _Guess:
-    """Where a search starts, and the family that it searches in."""
+    """Starting point of a search, and the family of drives."""
 
     x: FloatArray
     """Decision variables."""
     scale: FloatArray
-    """What moves about one metre of rope, for each variable."""
+    """Change of each variable that moves about one metre of rope."""
     sample: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
     """Angle and speed (T,) of a drive at the objective's times, from its variables (n,)."""
     jacobian: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-    """Their derivatives (T, n) by the variables."""
+    """Jacobians (T, n) of angle and speed by the variables."""
 
 
 def _spline_guess(objective: Objective, intervals: int, given: FloatArray | None) -> _Guess:

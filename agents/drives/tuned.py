@@ -23,7 +23,7 @@ TUNED: Final[dict[str, Tuned]] = {
     "H-Ω1": Tuned("harmonic", "omega1"),
     "H-Ω2": Tuned("harmonic", "omega2"),
 }
-"""By the paper's names."""
+"""Tuned families, by the paper's names."""
 
 
 def optimised(

@@ -1,4 +1,4 @@
-"""What agents see and do, as in ``features``, for tensors on any device: nothing goes to the processor and back."""
+"""Features of the learned agents, as in ``features``, for tensors on any device, without a way by the processor."""
 
 from __future__ import annotations
 
