@@ -40,7 +40,7 @@ class HeldOut:
 
     @property
     def plain(self) -> dict[str, Any]:
-        """As plain data."""
+        """Return it as plain data."""
         return asdict(self)
 
 

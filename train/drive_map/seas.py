@@ -30,7 +30,7 @@ KINDS: Final[dict[str, ScenarioDistribution]] = {
 
 @dataclass(frozen=True)
 class InSea:
-    """What the policies do in one kind of sea."""
+    """Results of the policies in one kind of sea."""
 
     kind: str
     entries: Sequence[Entry]

@@ -1,4 +1,4 @@
-"""notes.md: the table, what was assumed, and where the experiment differs from the paper's and why."""
+"""notes.md: the table, the assumptions, and the differences from the paper's experiment with their reasons."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ PAPER = """\
 
 
 def _comparison(results: Sequence[Result]) -> str:
-    """The families against each other."""
+    """Compare the families."""
     amplitude = {r.row.label: r.row.amplitude for r in results}
     text = ""
     for index in "12":
@@ -52,7 +52,7 @@ def _comparison(results: Sequence[Result]) -> str:
 
 
 def _demands(results: Sequence[Result], times: FloatArray, winch: Winch) -> str:
-    """What the drives ask of the winch."""
+    """Table of the drives' demands on the winch."""
     r = winch.drum_radius
     rows = []
     for result in results:
@@ -67,7 +67,7 @@ def _demands(results: Sequence[Result], times: FloatArray, winch: Winch) -> str:
 
 
 def _transfers(results: Sequence[Result]) -> str:
-    """The same drives in the full model."""
+    """Table of the same drives in the full model."""
     rows = [
         (
             result.row.label,
