@@ -64,7 +64,7 @@ def _cached(function: F, **options: Any) -> F:
 
 
 class _Announcer(event.Listener):
-    """Says once in a process that it compiles: nothing else would be seen for many seconds."""
+    """Announcement, once in a process, of a compilation: nothing else would be seen for many seconds."""
 
     def __init__(self) -> None:
         self._silent = False

@@ -79,7 +79,7 @@ def begin_load(row: Array, span: Span) -> None:
 
 @scalar
 def inner_step(row: Array, index: int, span: Span) -> None:
-    """Inner step number ``index`` of the segment, for every lane that has so many (the others stand still)."""
+    """Make inner step ``index`` of the segment in every lane that has so many (the others stand still)."""
     lanes = span.stride
     for j in range(span.begin, span.end):
         active = index < row[at.SUBSTEPS * lanes + j]
@@ -137,7 +137,7 @@ def inner_step(row: Array, index: int, span: Span) -> None:
 
 @scalar
 def measure_tension(row: Array, span: Span) -> None:
-    """Rope tension at the row's present state, and whether the rope is slack."""
+    """Measure the rope tension at the row's present state, and whether the rope is slack."""
     lanes = span.stride
     for j in range(span.begin, span.end):
         radius = row[at.DRUM_RADIUS * lanes + j]

@@ -34,7 +34,7 @@ class EnergyBalance:
 
 
 def energy_balance(result: DynamicResult) -> EnergyBalance:
-    """Balance of a run whose output interval is its step (powers are integrated by the trapezoidal rule).
+    """Compute the balance of a run whose output interval is its step (powers are integrated by the trapezoidal rule).
 
     The deck's work is that of the reactions, so this checks them too. On a deck that turns the frame's
     displacements turn with it, and the balance holds to first order in them only, like eq. (10).

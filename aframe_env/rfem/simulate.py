@@ -229,8 +229,7 @@ class _Run:
         return constant + apply_blocks(centrifugal, position) + apply_blocks(coriolis, velocity)
 
     def _evaluate(self, index: int, deflection: Array, deflection_rate: Array) -> None:
-        """Rope force at S (along {F}), accelerations of load and drum, for the present state of load and
-        drum."""
+        """Find rope force at S (along {F}) and accelerations of load and drum at the present state of these two."""
         scenario, drum, carriage = self.scenario, self.case.drum, self.carriage
         turn = carriage.rotation[index]
         moving = deflection_rate

@@ -69,7 +69,7 @@ class Sea:
     components: int = 32
     """Number of wave components."""
     seed: int = 0
-    """Draws frequencies, phases and directions."""
+    """Seed of frequencies, phases and directions."""
 
     def __post_init__(self) -> None:
         require_number("hs", self.hs, "m", low=0.0, high=30.0)

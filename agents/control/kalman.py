@@ -66,7 +66,7 @@ def schedule(bank: WaveBank, period: float, hold: int) -> Schedule:
     """Gains of the Kalman filter for a ship at rest at the start, by the recursion of its covariance over 60 s."""
     steps = hold * round(60.0 / period / hold) + hold
     exponent = _exponents(bank)
-    turn = np.append(np.exp(exponent * period), 1.0)[:, None]
+    transition = np.append(np.exp(exponent * period), 1.0)[:, None]
     rate = np.append(np.tile([1.0, 0.0], bank.bands), 0.0)
     inverse = 1.0 / exponent
     depth = np.append(np.stack([inverse.real, -inverse.imag], axis=1).ravel(), 1.0)
@@ -75,28 +75,28 @@ def schedule(bank: WaveBank, period: float, hold: int) -> Schedule:
     covariance = np.diag(np.append(np.zeros(2 * bank.bands), 1e-6))
     gains = np.zeros((2, steps, 2 * bank.bands + 1))
     for step in range(1, steps):
-        covariance = _turned(turn, _turned(turn, covariance).T)
+        covariance = _propagated(transition, _propagated(transition, covariance).T)
         rising = step * period < bank.build_up
         grow = 2.0 * period / bank.build_up if rising else -np.expm1(-2.0 * bank.damping * period)
         covariance[moving, moving] += 2.0 * share * grow
         covariance[-1, -1] += bank.offset_drift * period
         for kind, row, noise in ((0, rate, bank.rate_noise), (1, depth, bank.depth_noise)):
             if kind == 0 or step % hold == 0:
-                seen = (covariance * row).sum(axis=1)
-                gains[kind, step] = seen / ((row * seen).sum() + noise**2)
-                covariance -= np.outer(gains[kind, step], seen)
+                cross_covariance = (covariance * row).sum(axis=1)
+                gains[kind, step] = cross_covariance / ((row * cross_covariance).sum() + noise**2)
+                covariance -= np.outer(gains[kind, step], cross_covariance)
     paired = gains[..., :-1:2] + 1j * gains[..., 1::2]
     both = np.concatenate([paired, gains[..., -1:]], axis=-1)
     return Schedule(both[0], both[1], hold)
 
 
-def _turned(turn: ComplexArray, columns: FloatArray) -> FloatArray:
+def _propagated(transition: ComplexArray, columns: FloatArray) -> FloatArray:
     """Columns (2 bands + 1, n) of oscillators, real and imaginary parts in turn, a control step later.
 
     No matrix product: the last digit of such a one depends on the threads that happen to share it.
     """
     pairs = np.concatenate([columns, np.zeros_like(columns[:1])])
-    later = turn * (pairs[::2] + 1j * pairs[1::2])
+    later = transition * (pairs[::2] + 1j * pairs[1::2])
     return np.stack([later.real, later.imag], axis=1).reshape(pairs.shape)[:-1]
 
 
@@ -112,7 +112,7 @@ class WaveFilter:
         bank = bank or WaveBank()
         self._schedule = schedule(bank, control_period, hold)
         self._exponent = _exponents(bank)
-        self._turn = np.append(np.exp(self._exponent * control_period), 1.0)
+        self._transition = np.append(np.exp(self._exponent * control_period), 1.0)
         self._state = np.zeros((rows, bank.bands + 1), dtype=np.complex128)
         """The heave rate is the sum of the real parts of all but the last, m/s; the last is the offset, m."""
         self._step = np.zeros(rows, dtype=np.int64)
@@ -125,7 +125,7 @@ class WaveFilter:
     def advance(self, heave_rate: FloatArray) -> None:
         """Take a reading (N,) m/s of the pulley's heave rate, a control step later."""
         self._step += 1
-        self._state *= self._turn
+        self._state *= self._transition
         innovation = heave_rate - self._state[:, :-1].real.sum(axis=1)
         self._state += innovation[:, None] * self._schedule.rate[self._schedule.index(self._step)]
 
@@ -184,10 +184,10 @@ class RopeFilter:
         a = self._a
         x = (a @ self._x[:, :, None])[:, :, 0] + self._b * speed[:, None]
         p = a @ self._covariance @ a.transpose(0, 2, 1) + self._process_noise
-        seen = p[:, :, 2] - p[:, :, 0]
-        gain = seen / (seen[:, 2] - seen[:, 0] + self._noise)[:, None]
+        cross_covariance = p[:, :, 2] - p[:, :, 0]
+        gain = cross_covariance / (cross_covariance[:, 2] - cross_covariance[:, 0] + self._noise)[:, None]
         self._x = x + gain * (stretch - (x[:, 2] - x[:, 0]))[:, None]
-        self._covariance = p - gain[:, :, None] * seen[:, None, :]
+        self._covariance = p - gain[:, :, None] * cross_covariance[:, None, :]
 
     @property
     def stretch(self) -> FloatArray:

@@ -68,7 +68,7 @@ class StateFeatures:
     def __init__(self, rows: int, control_period: float) -> None:
         self._hoists = HoistBatch(rows, control_period, STATE)
         self._rise = np.zeros(rows)
-        """Of the pulley during the coming control step, (N,) m."""
+        """Rise of the pulley during the coming control step, (N,) m."""
 
     def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
         """Features (n, F) of the first observations (n, K) of these ``rows``, hoists with these ``cranes`` (n)."""
@@ -105,7 +105,7 @@ class SensedFeatures:
         self._turned = np.zeros(rows)
         """Turn of the drums in this control step, rad."""
         self._rise = np.zeros(rows)
-        """Of the pulley during the coming control step, (N,) m."""
+        """Rise of the pulley during the coming control step, (N,) m."""
 
     def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
         """Features (n, F) of the first observations (n, K) of these ``rows``, whose past is forgotten."""

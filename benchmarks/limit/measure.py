@@ -28,7 +28,7 @@ error of the pulley's path between its knots is of this order, the rest is round
 
 
 def set_up(limit: Limit, scenario: Scenario) -> None:
-    """Give all rows the parameters of a scenario, the load hanging right below the pulley of a ship at rest."""
+    """Set the parameters of a scenario in all rows, the load hanging right below the pulley of a ship at rest."""
     crane = scenario.crane
     values = {
         "mass": scenario.load_mass,

@@ -53,7 +53,7 @@ def add_line(sums: Array, table: Array, first: int, size: int, factor: float) ->
 
 @scalar
 def read_frame(frame: Array, table: Array, stresses: Array, result: Array, lanes: int, j: int) -> None:
-    """Readout of lane j into ``result`` (READOUTS,); ``stresses`` (6 n_sde,) is scratch."""
+    """Write the readout of lane j into ``result`` (READOUTS,); ``stresses`` (6 n_sde,) is scratch."""
     modes, carried, springs = int(table[COUNT]), int(table[CARRIED_COUNT]), int(table[SPRINGS])
     points = int(table[POINTS])
     forces = result[:FORCES]
