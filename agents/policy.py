@@ -1,4 +1,4 @@
-"""What every policy is: drum speed commands for a batch of episodes, and a statement of what it knows."""
+"""Interface of every policy: drum speed commands for a batch of episodes, and a statement of its knowledge."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class Knowledge(Enum):
-    """What a policy is allowed to know. A privileged one is never put beside another without saying so."""
+    """Knowledge that a policy is allowed. A privileged one is never put beside another without saying so."""
 
     NOTHING = "nothing"
     CLOCK = "clock"

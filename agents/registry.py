@@ -1,4 +1,4 @@
-"""Policies by name, by folder, or as anybody's ``module:function``: what the comparison can be asked for.
+"""Policies by name, by folder, or as anybody's ``module:function``, for the comparison.
 
 A new kind of policy joins by one entry in ``REGISTRY``, one that lives in a folder by one entry in ``FOLDERS``.
 """
@@ -36,7 +36,7 @@ Result = TypeVar("Result")
 
 
 class Spread(Protocol):
-    """Calls a picklable function on every item, perhaps in parallel; the results are in the items' order."""
+    """Map of a picklable function over items, perhaps in parallel; the results are in the items' order."""
 
     def __call__(self, function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
         """Return ``[function(item) for item in items]``."""
@@ -44,22 +44,22 @@ class Spread(Protocol):
 
 
 def in_turn(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-    """One item after the other."""
+    """Call the function on one item after the other."""
     return [function(item) for item in items]
 
 
 @dataclass(frozen=True, kw_only=True)
 class BuildContext:
-    """What a policy is built for."""
+    """Task that a policy is built for."""
 
     scenarios: Sequence[Scenario]
-    """That it will run in. Only a policy that knows the future may look at their seas."""
+    """Scenarios that it will run in. Only a policy that knows the future may look at their seas."""
     nominal: Scenario
-    """That a policy which knows no more than the clock may be tuned for."""
+    """Scenario that a policy that knows no more than the clock may be tuned for."""
     config: TaskConfig
     """The task; its observation is what a policy sees that is not made for another."""
     spread: Spread = in_turn
-    """For policies that take many independent computations to build."""
+    """Map over independent computations, for policies that take many of them to build."""
 
     @property
     def sensors(self) -> Sensors:
@@ -74,7 +74,7 @@ class PolicySpec:
     name: str
     build: Callable[[BuildContext], Policy]
     for_each_scenario: bool = False
-    """Whether building it takes an optimisation for each scenario: it then runs in the first few of them only."""
+    """True if building it takes an optimisation for each scenario: it then runs in the first few of them only."""
 
 
 def _drum_still(context: BuildContext) -> Policy:
@@ -124,7 +124,7 @@ FOLDERS: Final[dict[str, Callable[[Path], Policy]]] = {
     learned.CARD: learned.load,
     drive_map.CARD: lambda folder: DriveMapPolicy(drive_map.load(folder)),
 }
-"""What loads a policy from a folder, by the file that the folder must have."""
+"""Loaders of a policy from a folder, by the file that the folder must have."""
 
 
 def slug(name: str) -> str:
@@ -133,7 +133,7 @@ def slug(name: str) -> str:
 
 
 def choose(text: str) -> PolicySpec:
-    """A policy from its name in the registry (or the name's slug), its folder, or ``module:function``."""
+    """Return the policy of that name in the registry (or the name's slug), folder, or ``module:function``."""
     by_slug = {slug(name): spec for name, spec in REGISTRY.items()}
     if slug(text) in by_slug:
         return by_slug[slug(text)]
@@ -149,9 +149,9 @@ def choose(text: str) -> PolicySpec:
 
 
 def choose_all(texts: Sequence[str]) -> list[PolicySpec]:
-    """Policies from their names, folders or functions; a folder of agents of several seeds stands for all of them.
+    """Return policies by names, folders or functions; a folder of agents of several seeds stands for all of them.
 
-    Policies of one name are told apart by their seeds or else by what was asked for.
+    Policies of one name are told apart by their seeds or else by the names, folders or functions given.
     """
     asked = list(dict.fromkeys(each for text in texts for each in _expanded(text)))
     specs = [choose(text) for text in asked]
@@ -169,7 +169,7 @@ def _expanded(text: str) -> list[str]:
 
 
 def as_spec(policy: Policy) -> PolicySpec:
-    """A policy that is there already."""
+    """Wrap a policy that exists already."""
     return PolicySpec(policy.name, lambda context: policy)
 
 
@@ -197,7 +197,7 @@ class FunctionPolicy:
         self.rows = len(scenarios)
 
     def act(self, observation: npt.NDArray[np.float32], time: float) -> FloatArray:
-        """What the function says, checked: (N,) rad/s."""
+        """Drum speed commands of the function, checked: (N,) rad/s."""
         said = self.function(observation, time) if self.takes_time else self.function(observation)
         try:
             speeds = np.asarray(said, dtype=np.float64)
@@ -213,7 +213,7 @@ class FunctionPolicy:
 
 
 def _from_module(text: str, module: str, attribute: str) -> PolicySpec:
-    """A policy from ``module:attribute``, the current folder included in the search.
+    """Import a policy from ``module:attribute``, the current folder included in the search.
 
     The attribute is a policy, a class or function that makes one when called without arguments, or a function of
     observations (N, K), and time if it takes two arguments, that gives drum speeds (N,) rad/s.

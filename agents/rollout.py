@@ -43,7 +43,7 @@ BAND = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class Episodes:
-    """What came of N episodes. A row whose rope parts is counted until then, and its free fall in Ω1 and Ω2."""
+    """Results of N episodes. A row whose rope parts is counted until then, and its free fall in Ω1 and Ω2."""
 
     omega1: FloatArray
     """(N,) ∫ (x_L3 - h)² dt, m² s."""
@@ -52,7 +52,7 @@ class Episodes:
     duration: float
     """s."""
     slack_events: npt.NDArray[np.int64]
-    """(N,) how often the rope went slack."""
+    """(N,) number of times the rope went slack."""
     peak_tension: FloatArray
     """(N,) greatest rope tension, inner steps included, N."""
     drum_travel: FloatArray
@@ -62,7 +62,7 @@ class Episodes:
     time_outside: FloatArray
     """(N,) time with a depth error beyond ±BAND, and all that is left after a parted rope, s."""
     parted: npt.NDArray[np.bool_]
-    """(N,) whether the rope parted."""
+    """(N,) true if the rope parted."""
     error: npt.NDArray[np.float32]
     """(N, steps + 1) depth error at the control steps, m."""
     drum_speed: npt.NDArray[np.float32]
@@ -77,7 +77,7 @@ class Episodes:
 
     @property
     def slack(self) -> npt.NDArray[np.bool_]:
-        """(N,) whether the rope was ever slack."""
+        """(N,) true if the rope was ever slack."""
         return self.slack_events > 0
 
     @property

@@ -1,6 +1,6 @@
 """Measure the package beside its peers, and write benchmarks.json, benchmarks.md and benchmarks.png.
 
-``make bench`` sets up the peers' environment and runs this. What is measured is in catalogue.py, the bars in bars.py.
+``make bench`` sets up the peers' environment and runs this. The measures are in catalogue.py, the bars in bars.py.
 An interrupted run keeps what it has: ``--resume`` goes on with it.
 """
 
@@ -29,12 +29,12 @@ from train.shared.run_folder import user_errors
 
 @dataclass(frozen=True)
 class Options:
-    """What to measure, and how often."""
+    """Measures of a run, and their number of samples."""
 
     rounds: int = 5
     """Samples of each measure, taken in turn."""
     quick: bool = False
-    """For trying: one round, without what takes many seconds."""
+    """Trial run: one round, without slow measures."""
     only: tuple[str, ...] = ()
     """Words: measure only what has one of them in its name, e.g. "envpool", "limit/double", "@1"."""
     out: Path | None = None
@@ -57,7 +57,7 @@ class Options:
 
 
 class Measuring:
-    """Takes the samples of a run, round by round."""
+    """Sampling of a run, round by round."""
 
     def __init__(self, run: Run, pythons: Pythons, partial: Path) -> None:
         self.run = run
@@ -70,7 +70,7 @@ class Measuring:
         return min(self.run.rounds, measure.rounds or self.run.rounds)
 
     def all(self, measures: list[Measure], bars: Progress) -> None:
-        """Every sample that is not there yet, in turn."""
+        """Take every missing sample, in turn."""
         missing = sum(self.wanted(m) - len(self.run.series[m.key].samples) for m in measures)
         bar = bars.add_task("", total=missing)
         for index in range(self.run.rounds):
@@ -109,7 +109,7 @@ def _compiler() -> str:
 
 
 def _open(options: Options, partial: Path) -> Run:
-    """A new run, or the interrupted one."""
+    """Open a new run, or the interrupted one."""
     machine = Machine.here(_compiler())
     command = shlex.join(["python", "-m", "benchmarks", *(arg for arg in sys.argv[1:] if arg != "--resume")])
     new = Run.new(command, 1 if options.quick else options.rounds, machine)

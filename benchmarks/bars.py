@@ -1,4 +1,4 @@
-"""The bars, and whether they hold: every word of a verdict is computed from the samples."""
+"""The bars and their verdicts: every word of a verdict is computed from the samples."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class Verdict:
     peer: str
     ratio: str
     met: bool | None
-    """By the median. None where it could not be measured; ``measured`` or ``peer`` then says why."""
+    """Verdict by the median. None where it could not be measured; ``measured`` or ``peer`` then says why."""
     split: bool = False
-    """Whether some rounds say the opposite."""
+    """True if some rounds contradict the verdict."""
 
     @property
     def word(self) -> str:
@@ -68,7 +68,7 @@ def best_of(run: Run, keys: Sequence[str]) -> str | None:
 
 
 def ratios(mine: Series, peer: Series) -> list[float]:
-    """How many times the peer's speed, round by round."""
+    """Ratio to the peer's speed, round by round."""
     return [a / b for a, b in zip(mine.samples, peer.samples, strict=False)]
 
 
@@ -81,7 +81,7 @@ class Ratio:
     peers: tuple[str, ...]
     least: float
     of: str
-    """What the peer is, in the bar's words."""
+    """Name of the peer, in the bar's words."""
 
     def verdict(self, run: Run) -> Verdict:
         """Compare round by round."""

@@ -1,4 +1,4 @@
-"""Everything that is measured: which script measures it, on how many cores, in which unit."""
+"""Catalogue of all measures: script, number of cores, unit."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ ENVPOOL: Final = tuple(
 
 @dataclass(frozen=True)
 class Script:
-    """A measuring script and what runs it."""
+    """A measuring script and its interpreter."""
 
     path: str
-    """From the repository's root."""
+    """Path from the repository's root."""
     interpreter: Interpreter = "package"
 
 
 @dataclass(frozen=True)
 class Measure:
-    """One thing that is measured."""
+    """A measure."""
 
     group: str
     name: str
-    """What the script calls it."""
+    """The script's name for it."""
     cores: int
     script: Script
     what: str
     unit: str = STEPS
     rounds: int | None = None
-    """Most rounds, where a sample takes long."""
+    """Greatest number of rounds, where a sample takes long."""
     slow: bool = False
-    """Takes many seconds to build or to measure: left out of a quick run."""
+    """True if it takes many seconds to build or to measure: left out of a quick run."""
 
     @property
     def key(self) -> str:
@@ -52,7 +52,7 @@ ENVIRONMENTS: Final = Script("benchmarks/package/environments.py")
 DRIVES: Final = Script("benchmarks/package/drives.py")
 STARTUP: Final = Script("benchmarks/package/startup.py")
 GYMNASIUM: Final = Script("benchmarks/peers/gymnasium_envs.py")
-"""With the package's own Gymnasium, so that both sides have the same wrappers."""
+"""Gymnasium's environments in the package's own Gymnasium, so that both sides have the same wrappers."""
 MUJOCO: Final = Script("benchmarks/peers/mujoco_pendulum.py", "peers")
 ENVPOOL_SCRIPT: Final = Script("benchmarks/peers/envpool_pendulum.py", "peers")
 GYMNAX: Final = Script("benchmarks/peers/gymnax_pendulum.py", "peers")
@@ -116,7 +116,7 @@ def _others() -> Iterator[Measure]:
 
 
 MEASURES: Final[dict[str, Measure]] = {measure.key: measure for measure in (*_speeds(), *_others())}
-"""By key, in the order of the run."""
+"""All measures by key, in the order of the run."""
 
 
 def matching(only: tuple[str, ...], quick: bool = False) -> list[Measure]:

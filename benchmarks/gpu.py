@@ -36,7 +36,7 @@ WARM: Final = 10
 
 @dataclass(frozen=True)
 class Options:
-    """What to measure, and how often."""
+    """Measures of a run, and their number of samples."""
 
     rows: tuple[int, ...] = (1024, 4096, 16_384, 65_536, 262_144, 1_048_576)
     """Rows of the environment."""
@@ -69,7 +69,7 @@ class Speed:
     steps_per_second: list[float]
     """Env steps a second, over all rows, one a round."""
     bandwidth_share: float
-    """What moving a row's memory once a step (see ``bytes_moved``) takes of the card's copy bandwidth; median."""
+    """Share of the card's copy bandwidth that moving a row's memory once a step takes (see ``bytes_moved``); median."""
     bytes_a_row: float | None
     """Memory of the device a row, at its most; None on the processor."""
 

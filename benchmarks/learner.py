@@ -43,7 +43,7 @@ Setup = Literal["this package", "plain"]
 
 @dataclass(frozen=True)
 class Options:
-    """How long to try."""
+    """Targets and limits of the learning."""
 
     target: float = 0.95
     """Median heave reduction to reach."""
@@ -102,7 +102,7 @@ class Plain:
         self._model, self._normalise = model, normalise
 
     def reset(self, scenarios: object, control_period: float) -> None:
-        """Nothing to do."""
+        """Do nothing."""
 
     def act(self, observation: FloatArray, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s."""
@@ -111,7 +111,7 @@ class Plain:
 
 
 class Clock(BaseCallback):
-    """Stops the learner at the target or the limit."""
+    """Callback that stops the learner at the target or the limit."""
 
     def __init__(self, policy: Callable[[], Policy], options: Options) -> None:
         super().__init__()
@@ -125,7 +125,7 @@ class Clock(BaseCallback):
 
     @property
     def reached(self) -> bool:
-        """Whether the target was reached."""
+        """True if the target was reached."""
         return bool(self.reductions) and self.reductions[-1] >= self._options.target
 
     def _on_training_start(self) -> None:
@@ -161,7 +161,7 @@ def watch(setup: Setup, seed: int, model: BaseAlgorithm, timesteps: int, clock: 
 
 
 def ours(seed: int, options: Options) -> Outcome:
-    """This package's PPO."""
+    """Learn with this package's PPO."""
     chosen = ppo.Options(seed=seed)
     learner = ppo.build(chosen)
     clock = Clock(lambda: to_policy(learner, chosen)[0], options)
@@ -169,7 +169,7 @@ def ours(seed: int, options: Options) -> Outcome:
 
 
 def plain(seed: int, options: Options) -> Outcome:
-    """The plain way."""
+    """Learn in the plain way."""
     chosen = ppo.Options(seed=seed)
     rows = VecNormalize(
         DummyVecEnv([lambda: gymnasium.make("AFrameHeave-v0", episode_duration=60.0)] * chosen.n_envs),

@@ -40,11 +40,11 @@ HEADLINES: Final[tuple[tuple[str, str, tuple[str, ...], str], ...]] = (
     ("memory of a row of the vector environment", "env/memory-peak@2", (), ""),
     ("make and reset the environment, warm compile cache", "startup/warm@1", (), ""),
 )
-"""What the README quotes: what, measure, peer's measures, peer."""
+"""Figures that the README quotes: title, measure, peer's measures, peer."""
 
 
 def headlines(run: Run) -> Iterator[tuple[str, str, str]]:
-    """What, its median, and the spread of its ratio to the peer."""
+    """Title, median, and spread of the ratio to the peer of each figure."""
     for what, key, peers, name in HEADLINES:
         if run.get(key).measured:
             best = best_of(run, peers)

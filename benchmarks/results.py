@@ -19,14 +19,14 @@ NOT_ASKED: Final = "not measured in this run"
 
 @dataclass
 class Series:
-    """Samples of one measure, one a round; or why there are none."""
+    """Samples of one measure, one a round; or the reason why there are none."""
 
     samples: list[float] = field(default_factory=list)
     error: str = ""
 
     @property
     def measured(self) -> bool:
-        """Whether there are samples, and none of them failed."""
+        """True if there are samples, and none of them failed."""
         return bool(self.samples) and not self.error
 
     @property
@@ -37,7 +37,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Machine:
-    """What was measured on."""
+    """Machine of a run."""
 
     processor: str
     cores: int
@@ -72,9 +72,9 @@ class Run:
     machine: Machine
     versions: dict[str, str]
     series: dict[str, Series]
-    """By key of the measure."""
+    """Series by key of the measure."""
     peer_versions: dict[str, dict[str, str]] = field(default_factory=dict)
-    """By script."""
+    """Versions of the peers' packages by script."""
 
     @classmethod
     def new(cls, command: str, rounds: int, machine: Machine) -> Run:
@@ -86,7 +86,7 @@ class Run:
         return self.series.get(key, Series(error=NOT_ASKED))
 
     def data(self) -> dict[str, Any]:
-        """As plain data."""
+        """Return the run as plain data."""
         return dict(strict_converter().unstructure(self))
 
     def save(self, path: Path) -> None:
@@ -95,7 +95,7 @@ class Run:
 
     @classmethod
     def load(cls, path: Path) -> Run:
-        """Read what ``save`` wrote."""
+        """Read a file that ``save`` wrote."""
         try:
             data = json.loads(path.read_text(encoding="utf-8"))
         except json.JSONDecodeError as error:

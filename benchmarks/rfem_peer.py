@@ -40,7 +40,7 @@ Start = Literal["comoving", "rest"]
 
 DURATION = 60.0
 INTERVAL = 0.1
-"""Of the outputs, and our control step, s; every step divides it."""
+"""Interval of the outputs, and our control step, s; every step divides it."""
 BAR = 1e-3
 """Error of x_L3 that is allowed, m."""
 LADDER = (2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 25, 32, 40)
@@ -60,7 +60,7 @@ class Run:
     heights: FloatArray
     """x_L3 every INTERVAL, (k,), m."""
     wall: float
-    """Of the integration alone, s."""
+    """Wall-clock time of the integration alone, s."""
     cpu: float
     """s."""
 
@@ -71,14 +71,14 @@ class Choice:
 
     mesh: tuple[int, int]
     steps: int
-    """In an output interval."""
+    """Steps in an output interval."""
     error: float
-    """Of x_L3, m."""
+    """Error of x_L3, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PeerSettings:
-    """How exudyn integrates."""
+    """Integrator settings of exudyn."""
 
     solver: str = "GeneralizedAlpha"
     spectral_radius: float = 0.9
@@ -158,7 +158,7 @@ class Peer:
 
 
 class Searched:
-    """A program with what it has computed already."""
+    """A program with a cache of its runs."""
 
     def __init__(self, program: Ours | Peer) -> None:
         self.program = program
@@ -323,7 +323,7 @@ def main() -> None:
 
 
 def print_table(start: Start, name: str, found: dict[str, Any] | str) -> None:
-    """A few lines of what was found."""
+    """Print a few lines of results."""
     if isinstance(found, str):
         say(f"{start}, {name}: {found}")
         return

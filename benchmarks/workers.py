@@ -22,12 +22,12 @@ THREADS: Final = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS"
 
 
 class NotMeasured(RuntimeError):
-    """Why there is no sample, in a line."""
+    """Reason why there is no sample, in a line."""
 
 
 @dataclass(frozen=True)
 class Pythons:
-    """What runs the scripts."""
+    """Interpreters of the scripts."""
 
     peers: Path
     """Interpreter of the peers' environment."""
@@ -92,7 +92,7 @@ class Worker:
             raise
 
     def sample(self, name: str) -> float:
-        """One sample, in the measure's unit; raises NotMeasured."""
+        """Take one sample, in the measure's unit; raises NotMeasured."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(name + "\n")
@@ -137,7 +137,7 @@ class Worker:
         return self._explained(lines[-1] if lines else f"ended with status {self._process.returncode}")
 
     def _explained(self, error: str) -> str:
-        """With the reason, where a package is missing because it could not be installed."""
+        """Add the reason, where a package is missing because it could not be installed."""
         if "No module named" in error:
             for package, reason in self._pythons.failures().items():
                 if package.partition("==")[0] in error:

@@ -1,4 +1,4 @@
-"""The CUDA device: is it there, and how tensors and streams of torch look to numba."""
+"""The CUDA device, and numba's views of torch's tensors and streams."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from aframe_env.validation import InvalidValue
 
 
 def simulated() -> bool:
-    """Whether numba's simulator stands in for the device; tensors then live in the computer's memory."""
+    """Return whether numba's simulator stands in for the device; tensors then live in the computer's memory."""
     return bool(config.ENABLE_CUDASIM)
 
 
 def open_device(name: str) -> torch.device:
-    """Return where the tensors of device ``name`` ("cuda" or "cuda:N") live, ready to launch kernels on.
+    """Return the device ``name`` ("cuda" or "cuda:N"), ready to launch kernels on.
 
     Raises:
         DependencyNotInstalled: numba-cuda is missing.

@@ -50,7 +50,7 @@ _ROPE: Final = 2 * SUBSTREAM
 
 
 class Tables(NamedTuple):
-    """What a row is drawn from."""
+    """Tables that a row is drawn from."""
 
     row: FloatArray
     """(slots,) a row of the distribution at its start; what is not drawn is taken from it."""

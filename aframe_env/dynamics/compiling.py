@@ -1,4 +1,4 @@
-"""How the physics is compiled: decorators for scalar functions and kernels, and a cache that is never stale.
+"""Compilation of the physics: decorators for scalar functions and kernels, and a cache that is never stale.
 
 numba keeps what it has compiled in ``NUMBA_CACHE_DIR``, else beside the sources, else, where they are read-only, in the
 user's cache folder. Where none of these can be written to, each process compiles for itself.
@@ -64,13 +64,13 @@ def _cached(function: F, **options: Any) -> F:
 
 
 class _Announcer(event.Listener):
-    """Says once in a process that it compiles: nothing else would be seen for many seconds."""
+    """Announcement, once in a process, of a compilation: nothing else would be seen for many seconds."""
 
     def __init__(self) -> None:
         self._silent = False
 
     def on_start(self, event: Any) -> None:
-        """Of the compilation of a kernel that the cache has not."""
+        """Announce the compilation of a kernel that is not in the cache."""
         dispatcher = event.data["dispatcher"]
         if self._silent or dispatcher.py_func not in _kernels:
             return
@@ -87,7 +87,7 @@ class _Announcer(event.Listener):
         )
 
     def on_end(self, event: Any) -> None:
-        """Nothing to say."""
+        """Do nothing."""
 
 
 event.register("numba:compile", _Announcer())  # type: ignore[no-untyped-call]

@@ -1,4 +1,4 @@
-"""Where each quantity of a row lies: the slots of the engine's array.
+"""Memory layout of a row: the slots of the engine's array.
 
 The engine's array has shape (blocks, slots(components) * lanes): rows in blocks, each quantity contiguous over a
 block's lanes. An index `slot * lanes + lane` with constant slot and lanes shows the compiler that no two
@@ -15,7 +15,7 @@ LANES: Final = 64
 
 
 class Span(NamedTuple):
-    """Which lanes of a block to go through."""
+    """Lanes of a block to go through."""
 
     stride: int
     """Lanes in the block."""

@@ -1,8 +1,9 @@
 """The simplified model, eqs. (37)-(41): rigid frame, the load a particle on an elastic rope.
 
 The rope's law, the load's acceleration, and the Runge-Kutta step with the running Ω1 integral beside it. Whatever
-integrates the load (the engine, the drives' objective, the rows on a GPU) takes them from here, and a row's constants
-through :func:`load_constants`: a new force on the load is written here once.
+integrates this model (the engine, the drives' objective, the rows on a GPU) takes them from here, and a row's constants
+through :func:`load_constants`: a new force on the load is written here once. The compiled full model takes the rope's
+law from here; the stand-alone reference runs state it for themselves, in ``aframe_env.rfem.rope_law``.
 """
 
 from __future__ import annotations
@@ -28,19 +29,19 @@ class RopeEnd(NamedTuple):
     """Upper end of the rope at one time: the pulley S, and what the drum has paid out."""
 
     position: Vector
-    """Of the pulley in the base frame, m."""
+    """Pulley in the base frame, m."""
     velocity: Vector
     """m/s."""
     length: float
     """l, unstretched length between drum and load, m."""
     pay_out_speed: float
-    """Its rate, m/s."""
+    """Rate of that length, m/s."""
     stiffness: float
     """c_R = E_R F_R / l at that length, N/m."""
 
 
 class Constants(NamedTuple):
-    """What stays the same over a step."""
+    """Constants of a step."""
 
     drum_to_pulley: float
     """|SH|, m."""

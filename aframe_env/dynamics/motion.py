@@ -106,7 +106,7 @@ def sum_components(row: Block, components: int, span: Span) -> None:
 
 @scalar
 def read_record(row: Block, records: npt.NDArray[np.float64], span: Span) -> None:
-    """Deck coordinates of rows that follow a recorded motion: the table's line at the next node.
+    """Read the deck coordinates of rows that follow a recorded motion: the table's line at the next node.
 
     After the last line the deck stands still where that line has it.
     """
@@ -258,7 +258,7 @@ def lay_path(row: Block, span: Span) -> None:
 
 @scalar
 def pose_node(row: Block, components: int, records: npt.NDArray[np.float64], span: Span) -> None:
-    """Deck and pulley at the next node, from the components (or the record)."""
+    """Pose deck and pulley at the next node, from the components (or the record)."""
     sum_components(row, components, span)
     if records.shape[0] > 0:
         read_record(row, records, span)
@@ -267,7 +267,7 @@ def pose_node(row: Block, components: int, records: npt.NDArray[np.float64], spa
 
 @scalar
 def start_motion(row: Block, components: int, records: npt.NDArray[np.float64], span: Span) -> None:
-    """Deck and pulley at the start, which is the first node."""
+    """Pose deck and pulley at the start, which is the first node."""
     lanes = span.stride
     pose_node(row, components, records, span)
     for i in range(18):
@@ -326,7 +326,7 @@ def advance_motion(row: Block, components: int, records: npt.NDArray[np.float64]
 
 @scalar
 def end_motion(row: Block, span: Span) -> None:
-    """Acceleration of the pulley at the end of a segment."""
+    """Write the acceleration of the pulley at the end of a segment."""
     lanes = span.stride
     for axis in range(3):
         c = at.PATH + 6 * axis

@@ -28,7 +28,7 @@ def draw_seed(seed: int, index: int) -> int:
 
 @kernel
 def episode_uniforms(seed: int, row: int, episode: int, numbers: Any) -> None:
-    """Fill ``numbers`` (n,) with those of a row's ``episode``: uniform, the same whatever the other rows draw."""
+    """Fill ``numbers`` (n,) with uniform numbers of a row's ``episode``, the same whatever the other rows draw."""
     own, size = draw_seed(seed, row), numbers.shape[0]
     for k in range(size):
         numbers[k] = uniform(own, size * episode + k)

@@ -13,7 +13,7 @@ from aframe_env.dynamics import layout as at
 MAX_INNER_STEP: Final = 0.02
 """Longest inner step, s."""
 INNER_STEP_PHASE: Final = 0.1
-"""Most that the load's bobbing on the rope turns in one inner step, rad: RK4's phase error is then below 1e-6
+"""Greatest phase of the load's bobbing on the rope in one inner step, rad: RK4's phase error is then below 1e-6
 of the angle turned."""
 
 

@@ -1,4 +1,4 @@
-"""One control step of a block of rows: deck, winch, load. The kernels that every face of the package calls."""
+"""Control step of a block of rows: deck, winch, load. The kernels that every face of the package calls."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def drum_at(row: Array, lanes: int, j: int, elapsed: float, error: float) -> tup
 
 @scalar
 def begin_load(row: Array, span: Span) -> None:
-    """What the inner steps of a segment need of mass and rope."""
+    """Write the constants of load and rope for the inner steps of a segment."""
     lanes = span.stride
     for j in range(span.begin, span.end):
         row[at.INVERSE_MASS * lanes + j] = 1.0 / row[at.MASS * lanes + j]
@@ -79,7 +79,7 @@ def begin_load(row: Array, span: Span) -> None:
 
 @scalar
 def inner_step(row: Array, index: int, span: Span) -> None:
-    """Inner step number ``index`` of the segment, for every lane that has so many (the others stand still)."""
+    """Make inner step ``index`` of the segment in every lane that has so many (the others stand still)."""
     lanes = span.stride
     for j in range(span.begin, span.end):
         active = index < row[at.SUBSTEPS * lanes + j]
@@ -137,7 +137,7 @@ def inner_step(row: Array, index: int, span: Span) -> None:
 
 @scalar
 def measure_tension(row: Array, span: Span) -> None:
-    """Rope tension at the row's present state, and whether the rope is slack."""
+    """Measure the rope tension at the row's present state, and whether the rope is slack."""
     lanes = span.stride
     for j in range(span.begin, span.end):
         radius = row[at.DRUM_RADIUS * lanes + j]
@@ -182,7 +182,7 @@ def control_step(row: Array, components: int, segments: int, records: Array, spa
 
 @scalar
 def start_rows(row: Array, components: int, records: Array, span: Span) -> None:
-    """Deck, pulley and rope tension at the row's time, before the first step."""
+    """Pose deck and pulley and measure the rope tension at the rows' time, before the first step."""
     lanes = span.stride
     for j in range(span.begin, span.end):
         row[at.SLACK * lanes + j] = 0.0

@@ -23,7 +23,7 @@ ComplexArray = npt.NDArray[np.complex128]
 MAX_NODE_INTERVAL: Final = 0.4
 """Longest time between two nodes of the motion, s."""
 PATH_ERROR: Final = 4e-6
-"""Most that the quintics between nodes may be off the pulley's path, m: a bound to first order, seldom met."""
+"""Greatest error of the quintics between nodes against the pulley's path, m: a bound to first order, seldom met."""
 
 
 @scalar
@@ -106,7 +106,7 @@ def sixth_derivative_bound(
     y: float,
     z: float,
 ) -> float:
-    """What a component adds to the bound of the sixth derivative of the pulley's path, m/s⁶.
+    """Share of a component in the bound of the sixth derivative of the pulley's path, m/s⁶.
 
     ``frequency`` in rad/s; the component's amplitudes, m and rad; the pulley on the deck, m.
     """

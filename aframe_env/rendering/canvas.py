@@ -34,7 +34,7 @@ def _font(size: int, bold: bool) -> pygame.font.Font:
 
 
 class Canvas:
-    """What is drawn later lies above what is there."""
+    """Picture to draw on: later shapes lie above earlier ones."""
 
     def __init__(self, width: int, height: int) -> None:
         self.size = (width, height)

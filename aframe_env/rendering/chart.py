@@ -1,4 +1,4 @@
-"""Strip chart of the depth error and, beside it, of what the ship's pulley does."""
+"""Strip chart of the depth error and, beside it, of the pulley's heave."""
 
 from __future__ import annotations
 

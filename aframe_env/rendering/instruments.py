@@ -1,4 +1,4 @@
-"""Instruments: drum speed, rope tension, and what hangs on the rope."""
+"""Instruments: drum speed, rope tension, and the load on the rope."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SWEEP: Final = math.radians(125.0)
 
 
 def draw_instruments(canvas: Canvas, box: Box, scene: Scene) -> None:
-    """Draw the card with all of them."""
+    """Draw the card with all instruments."""
     left, top, width, _ = box
     canvas.box(box, palette.CARD, radius=8.0, edge=palette.EDGE)
     _draw_dial(canvas, np.array([left + 88.0, top + 92.0]), scene)

@@ -1,4 +1,4 @@
-"""The scene: what is to be drawn, in numbers."""
+"""The scene to be drawn, in numbers."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Scene:
     deck: FloatArray
     """Place of the deck's origin (3,)."""
     rotation: FloatArray
-    """Turns vectors of the deck frame to the base frame (3, 3)."""
+    """Rotation of the deck frame into the base frame (3, 3)."""
     pulley: FloatArray
     """Place of the pulley S (3,)."""
     pulley_heave: float
@@ -51,9 +51,9 @@ class Scene:
     tension: float
     """N."""
     slack: bool
-    """Whether the rope was slack within the last control step."""
+    """True if the rope was slack within the last control step."""
     parted: bool
-    """Whether the rope has parted."""
+    """True if the rope has parted."""
     drum_angle: float
     drum_speed: float
     """rad/s, positive pays out."""
@@ -112,7 +112,7 @@ def rotation(roll: float, pitch: float, yaw: float) -> FloatArray:
 
 
 def motion_in_words(motion: ShipMotion) -> str:
-    """Say what moves the ship, in a few words."""
+    """Describe the ship's motion in a few words."""
     if isinstance(motion, SeaMotion):
         sea = motion.sea
         heading = math.degrees(sea.heading) % 360.0

@@ -30,7 +30,7 @@ _BRIDGE_AFT, _BRIDGE_TOP = -32.0, 8.6
 
 
 def draw_ship(canvas: Canvas, view: View, scene: Scene) -> None:
-    """Draw the ship, but for what it carries."""
+    """Draw hull, deck and house."""
 
     def side(points: tuple[tuple[float, float], ...], y: float) -> FloatArray:
         return view.pixels(scene.on_deck([(x, y, z) for x, z in points]))

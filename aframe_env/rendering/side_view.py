@@ -19,13 +19,13 @@ SCALE: Final = 11.0
 """Pixels per metre."""
 _RECESSION: Final = (0.30, 0.15)
 _AFT, _ABOVE = 14.5, 17.0
-"""What is seen aft of the deck's origin and above it, m."""
+"""Extent of the view aft of the deck's origin and above it, m."""
 _BELOW: Final = 92.0
 """Height of the part about the load, pixels."""
 _GAP: Final = 18.0
 """Height of the band that stands for the rope left out, pixels."""
 _NEAR, _FAR = -11.0, 16.0
-"""Where, along y, the sea is cut towards the onlooker, and where it ends, m."""
+"""Ends of the sea along y, towards the onlooker and away, m."""
 
 
 def draw_side_view(canvas: Canvas, box: Box, scene: Scene) -> tuple[float, float]:

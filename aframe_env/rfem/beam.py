@@ -69,9 +69,9 @@ class Segment:
 
     member: Member
     low: float
-    """Where it begins, m from the member's start."""
+    """Beginning, m from the member's start."""
     high: float
-    """Where it ends, m from the member's start."""
+    """End, m from the member's start."""
 
     def point(self, position: float) -> Array:
         """Undeformed place in {F} of ``position`` m from the member's start, (3,)."""
@@ -101,15 +101,15 @@ class Spring:
 
     member: Member
     position: float
-    """Where it sits, m from the member's start."""
+    """Place, m from the member's start."""
     stiffness: Array
     """c_x1, c_x2, c_x3 (N/m), c_φ1, c_φ2, c_φ3 (N m/rad); (6,)."""
     damping: Array
     """d_x1 … d_φ3, N s/m and N m s/rad; (6,)."""
-    bulge: Array
-    """Section forces at the sde that a uniform acceleration field (columns: along {F}) makes without
-    deforming it, (6, 3), kg and kg m: what the load between the ends of one primary element bends, so that
-    the frame's weight too deflects it exactly. Zero unless the shear is corrected."""
+    fixed_end_forces: Array
+    """Section forces at the sde, in the middle of the primary element, under a unit uniform acceleration field
+    (columns: along {F}) while the element's ends are held, (6, 3), kg and kg m: with them the frame's weight too
+    deflects it exactly. Zero unless the shear is corrected."""
 
     @property
     def place(self) -> Array:
@@ -145,7 +145,7 @@ def divide(member: Member, elements: int, *, corrected_shear: bool = False) -> t
 
 
 def _spring(member: Member, middle: float, size: float, corrected_shear: bool) -> Spring:
-    """Eqs. (2)–(7); where the section changes inside the element, the compliances of its parts add up."""
+    """Make an element's sde, eqs. (2)–(7); where the section changes, the compliances of the parts add up."""
     material = member.material
     rigidity = np.zeros(6)
     bending = np.zeros(6)
@@ -175,14 +175,20 @@ def _spring(member: Member, middle: float, size: float, corrected_shear: bool) -
     if corrected_shear:
         compliance = compliance + bending / young
         loss = loss + bending * material.normal_damping / young**2
-    bulge = np.zeros((6, 3))
+    fixed_end_forces = np.zeros((6, 3))
     if corrected_shear:
         # The mean of M3 over an element is that at its middle + q2 Δ²/24 (M2: − q3 Δ²/24): dM3/dx = −V2,
         # dM2/dx = V3.
         half = 0.5 * size
         mass = sum(s.area * (high - low) for low, high, s in member.pieces(middle - half, middle + half))
         load = material.density * mass * size / 24.0 * member.axes
-        bulge[4], bulge[5] = load[:, 2], -load[:, 1]
+        fixed_end_forces[4], fixed_end_forces[5] = load[:, 2], -load[:, 1]
     stiffness = 1.0 / compliance
     # Two Kelvin–Voigt elements in a row, to first order in frequency: d = c² Σ d_k/c_k².
-    return Spring(member=member, position=middle, stiffness=stiffness, damping=stiffness**2 * loss, bulge=bulge)
+    return Spring(
+        member=member,
+        position=middle,
+        stiffness=stiffness,
+        damping=stiffness**2 * loss,
+        fixed_end_forces=fixed_end_forces,
+    )

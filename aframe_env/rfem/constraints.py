@@ -27,10 +27,10 @@ from aframe_env.scenario.crane import Frame
 
 @dataclass(frozen=True, kw_only=True)
 class Constraints:
-    """C q = b and what follows from it."""
+    """Constraints C q = b, and the matrices that eliminate them."""
 
     names: tuple[str, ...]
-    """Of the reactions, in the order of C's rows: S_R, S_L (tension, N; rigid servomotors only), the feet's
+    """Names of the reactions, in the order of C's rows: S_R, S_L (tension, N; rigid servomotors only), the feet's
     R_AR and R_AL (force on the frame along {F}, N), joints' forces and moments."""
     matrix: Array
     """C, (r, n)."""
@@ -59,7 +59,7 @@ def servomotor_direction(frame: Frame, side: str, angle: float | None = None) ->
 
 
 def servomotor_rows(frame: Frame, structure: Structure) -> Array:
-    """(2, n): how much shorter S_R and S_L get; the transpose times a tension is the force on the frame."""
+    """(2, n): shortening of S_R and S_L by q; the transpose times a tension is the force on the frame."""
     return np.vstack([-servomotor_direction(frame, side) @ structure.translation(f"N_{side}") for side in ("R", "L")])
 
 

@@ -1,4 +1,4 @@
-"""Energy balance of a run: what deck and drum put in, what frame, rope and load hold, what is lost."""
+"""Energy balance of a run: work of deck and drum, energy of frame, rope and load, and dissipation."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class EnergyBalance:
     """Work of the deck on feet, servomotors and drum, of the drum's drive, and of servomotors that change their
     length, (k,)."""
     dissipated: Array
-    """By the frame's material, servomotors and rope, (k,)."""
+    """Dissipation in the frame's material, servomotors and rope, (k,)."""
 
     @property
     def error(self) -> float:
@@ -34,7 +34,7 @@ class EnergyBalance:
 
 
 def energy_balance(result: DynamicResult) -> EnergyBalance:
-    """Balance of a run whose output interval is its step (powers are integrated by the trapezoidal rule).
+    """Compute the balance of a run whose output interval is its step (powers are integrated by the trapezoidal rule).
 
     The deck's work is that of the reactions, so this checks them too. On a deck that turns the frame's
     displacements turn with it, and the balance holds to first order in them only, like eq. (10).

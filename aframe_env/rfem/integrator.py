@@ -16,7 +16,7 @@ from aframe_env.validation import require_number
 
 
 class AverageAcceleration:
-    """Steps z̈ + L z̈ + K z = F(t) with a fixed step.
+    """Integrator of z̈ + L ż + K z = F(t) with a fixed step.
 
     Args:
         model: The frame.

@@ -18,8 +18,7 @@ import scipy
 from aframe_env.dynamics.flexible.readout import SMALL_ROTATION
 from aframe_env.rfem.beam import Array
 from aframe_env.rfem.constraints import Constraints, constrain, luffing_rotation, servomotor_rows
-from aframe_env.rfem.structure import Division, Structure, one_chain
-from aframe_env.rfem.three_beams import three_beams
+from aframe_env.rfem.structure import Division, Structure, one_chain, three_beams
 from aframe_env.scenario.crane import GRAVITY, Frame
 from aframe_env.validation import SmallRotationWarning, require_choice
 
@@ -142,11 +141,11 @@ class FrameModel:
         field = np.zeros((self.structure.size, 3))
         for index, body in enumerate(self.structure.bodies):
             field[6 * index : 6 * index + 3] = body.mass * body.axes.T
-        return np.asarray(field - self.deformation.T @ self._bulge.reshape(-1, 3), dtype=np.float64)
+        return np.asarray(field - self.deformation.T @ self._fixed_end_forces.reshape(-1, 3), dtype=np.float64)
 
     @cached_property
-    def _bulge(self) -> Array:
-        return np.array([spring.bulge for spring in self.structure.springs])
+    def _fixed_end_forces(self) -> Array:
+        return np.array([spring.fixed_end_forces for spring in self.structure.springs])
 
     def reactions(self, residual: Array, lengthening: Array | None = None) -> Array:
         """R, (…, r), of ``residual`` K q + L q̇ − f, (…, n), and s̈ of rigid servomotors, (…, 2), m/s²: Pᵀ(K q +
@@ -181,7 +180,7 @@ class FrameModel:
         if velocity is not None:
             forces = forces + (self.deformation @ velocity.T).T * self.structure.damping()
         result = np.asarray(forces).reshape(*position.shape[:-1], -1, 6)
-        return result if field is None else result + np.einsum("sij,...j->...si", self._bulge, field)
+        return result if field is None else result + np.einsum("sij,...j->...si", self._fixed_end_forces, field)
 
     def warn_of_rotation(self, position: Array) -> float:
         """Largest rotation of an rfe, rad; warn with the figure when it passes 0.05 rad."""

@@ -37,7 +37,7 @@ def frame_modes(crane: Crane, count: int = 10, *, model: FrameModel | None = Non
 
     Args:
         crane: The crane.
-        count: How many, at least 1 and at most the number of free coordinates.
+        count: Number of modes, at least 1 and at most the number of free coordinates.
         model: The frame's model, if it is not to be the default one (10 and 8 elements).
     """
     frame = model or frame_model(crane.frame)

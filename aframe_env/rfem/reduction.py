@@ -1,4 +1,4 @@
-"""The frame of the full model in modal coordinates: what the compiled kernels step, and what they read out.
+"""The frame of the full model in modal coordinates, as the compiled kernels step it and read it out.
 
 q = Φ η, with Φ of the frame's natural modes (ΦᵀMΦ = 1, ΦᵀKΦ = diag ω²), so that a force at S and the deck's motion
 reach each coordinate separately. With all modes the model is the full one, only in other coordinates. With fewer, the
@@ -47,7 +47,7 @@ class ModalFrame:
     turning: Array
     """Generalised inertial terms E_1 of the undeformed frame for W = α× + Ω×Ω×, (n, 3, 3)."""
     carried: Array
-    """The same of the lowest c modes' displacement, E(W) Φ = Σ W_cd carried[:, :, c, d], (n, c, 3, 3)."""
+    """Inertial terms of the lowest c modes' displacement, E(W) Φ = Σ W_cd carried[:, :, c, d], (n, c, 3, 3)."""
 
     @property
     def count(self) -> int:
@@ -89,7 +89,7 @@ def modal_frame(frame: Frame, division: Division, modes: int | None) -> ModalFra
     Args:
         frame: Geometry, material, sections, servomotors.
         division: Primary elements of legs and beam.
-        modes: How many natural modes to keep beside the static shapes; None for all.
+        modes: Number of natural modes to keep beside the static shapes; None for all.
     """
     model = frame_model(frame, division)
     to_deck = model.to_deck

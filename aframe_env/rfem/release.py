@@ -36,12 +36,12 @@ def release(
     output_interval: float = 5e-3,
     model: FrameModel | None = None,
 ) -> FrameHistory:
-    """Rest under ``case``, then its forces and rope tension go (own weight stays).
+    """Release a frame at rest under ``case``: its forces and rope tension go, its own weight stays.
 
     Args:
         crane: The crane.
         case: The load before.
-        ramp: Over how long it goes, s; 0 or more.
+        ramp: Time over which it goes, s; 0 or more.
         duration: s, above 0.
         step: s; made a little smaller so that a whole number of them makes an output interval.
         output_interval: s.

@@ -1,4 +1,8 @@
-"""Tension of the hoisting rope, eqs. (25)–(26): the one place where the full model's runs take it from."""
+"""Tension of the hoisting rope in the full model's stand-alone runs, eqs. (25)–(26).
+
+It is the reference runs' own statement of these equations. The compiled physics has its own, in
+``aframe_env.dynamics.load``, so that each can be checked against the other.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +10,12 @@ from typing import NamedTuple
 
 
 class RopeForce(NamedTuple):
-    """What the rope does at one instant."""
+    """Rope at one instant."""
 
     tension: float
     """N, 0 or more: a rope never pushes, not even a damped one."""
     elastic: float
-    """The part of the stretch alone, c Δ (0 when slack), N."""
+    """Its part from the stretch alone, c Δ (0 when slack), N."""
     stretch: float
     """Δ, m; negative when slack."""
 
@@ -25,7 +29,7 @@ def rope_force(
     stiffness: float,
     damping: float,
 ) -> RopeForce:
-    """T = max(0, c Δ + d Δ̇) with Δ = |LS| + |SH| − l.
+    """Tension T = max(0, c Δ + d Δ̇) with Δ = |LS| + |SH| − l, as the reference runs state it.
 
     Args:
         geometric: |LS| + |SH|, m.

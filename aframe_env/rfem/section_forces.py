@@ -1,4 +1,4 @@
-"""Section forces along the frame, and the stress they make.
+"""Section forces along the frame, and their stress.
 
 At an sde the section forces are its own forces. Anywhere inside an rfe they follow from the equilibrium of
 the part of the rfe between the sde before it and the cut, under its distributed weight and the point forces
@@ -10,7 +10,7 @@ behind the cut exerts on the part before it: N > 0 is tension.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,19 +19,17 @@ from aframe_env.rfem.beam import Array, Segment
 from aframe_env.rfem.model import FrameModel
 from aframe_env.scenario.cross_sections import GivenSection
 
-COMPONENTS = ("N", "V2", "V3", "T", "M2", "M3")
-
 
 @dataclass(frozen=True, kw_only=True)
 class Cut:
-    """Where the frame is cut."""
+    """A cut through the frame."""
 
     member: int
     """0 right leg, 1 top beam, 2 left leg."""
     position: float
-    """From the member's first end along the chain, m."""
+    """Distance from the member's first end along the chain, m."""
     behind_point: bool = True
-    """With a point force just there: cut behind it (True) or before it (False)."""
+    """Side of a point force just there: cut behind it (True) or before it (False)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,9 +38,9 @@ class PointForce:
 
     member: int
     position: float
-    """From the member's first end, m."""
+    """Distance from the member's first end, m."""
     force: Array
-    """In {F}, (3,), N."""
+    """Force in {F}, (3,), N."""
 
 
 class SectionForces:
@@ -141,9 +139,3 @@ def von_mises(section: GivenSection, forces: Array) -> Array:
         tau = shear2 * point.shear_2 + shear3 * point.shear_3 + torque * point.torsion
         worst = np.maximum(worst, np.sqrt(sigma**2 + 3.0 * tau**2))
     return worst
-
-
-def by_name(values: Array, names: Mapping[str, int] | None = None) -> dict[str, float]:
-    """N, V2, … → value; ``names`` picks and renames components."""
-    chosen = names or {name: index for index, name in enumerate(COMPONENTS)}
-    return {name: float(values[index]) for name, index in chosen.items()}

@@ -31,7 +31,7 @@ class Stroke:
 
     @classmethod
     def smooth(cls, change: float, duration: float) -> Stroke:
-        """From rest to ``change``, m, in ``duration``, s, along the quintic smoothstep."""
+        """Stroke from rest to ``change``, m, in ``duration``, s, along the quintic smoothstep."""
         require_number("change", change, "m")
         require_number("duration", duration, "s", low=0.0, low_open=True)
 

@@ -39,7 +39,7 @@ class PrescribedDrum:
     angle: Callable[[float], float]
     """φ_H(t), rad, 0 at t = 0; positive pays out."""
     rate: Callable[[float], float]
-    """Its derivative, rad/s."""
+    """Derivative φ̇_H(t), rad/s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +66,7 @@ class DynamicCase:
     """Crane, ship motion, load and rope; the load starts from static equilibrium. The luffing angle stays as it is, but
     for the small rotations that ``strokes`` make."""
     drum: Drum = field(default_factory=StillDrum)
-    """What the drum does."""
+    """Motion of the drum."""
     strokes: tuple[Stroke, Stroke] | None = None
     """Prescribed change of the lengths of rigid servomotors S_R and S_L; None: none."""
     duration: float = 60.0
@@ -97,9 +97,9 @@ class DynamicResult:
     load_velocity: Array
     """(k, 3), m/s."""
     tension: Array
-    """Of the rope, (k,), N."""
+    """Rope tension, (k,), N."""
     elastic_tension: Array
-    """Its part c Δ, (k,), N."""
+    """Part c Δ of the tension, (k,), N."""
     stretch: Array
     """Δ, (k,), m."""
     drum_angle: Array
@@ -169,7 +169,7 @@ class _Run:
         self.rope = RopeForce(0.0, 0.0, 0.0)
 
     def start(self) -> None:
-        """Static equilibrium with the deck level, carried to where the deck is at t = 0."""
+        """Start in static equilibrium with the deck level, carried to the deck's place at t = 0."""
         model, scheme, carriage = self.model, self.scheme, self.carriage
         tension = self.scenario.weight
         level = model.to_deck
@@ -202,8 +202,10 @@ class _Run:
         scheme.start(at_rest, np.zeros_like(at_rest), loads)
 
     def _carried(self, index: int, position: Array, velocity: Array) -> Array:
-        """What the free coordinates feel of weight, the deck's motion (its inertial terms) and the servomotors'
-        (−K P b − L P ḃ; P is M-orthogonal to Z, so that b̈ drops out), (n_z,)."""
+        """Generalised forces on the free coordinates, (n_z,): weight, inertial terms of the deck's motion, servomotors.
+
+        The servomotors' are −K P b − L P ḃ; P is M-orthogonal to Z, so that b̈ drops out.
+        """
         force = self.driving @ self.driven_by[index]
         if not self.carriage.turns:
             return np.asarray(force)
@@ -227,8 +229,7 @@ class _Run:
         return constant + apply_blocks(centrifugal, position) + apply_blocks(coriolis, velocity)
 
     def _evaluate(self, index: int, deflection: Array, deflection_rate: Array) -> None:
-        """Rope force at S (along {F}), accelerations of load and drum, for the present state of load and
-        drum."""
+        """Find rope force at S (along {F}) and accelerations of load and drum at the present state of these two."""
         scenario, drum, carriage = self.scenario, self.case.drum, self.carriage
         turn = carriage.rotation[index]
         moving = deflection_rate
@@ -265,7 +266,7 @@ class _Run:
             self.angular_acceleration = (torque + self.pull(self.rope) * self.radius) / drum.inertia
 
     def pull(self, rope: RopeForce) -> float:
-        """Force of the rope on the drum: what leaves takes strain energy along, c = E_R F_R / l, eq. (25)."""
+        """Force of the rope on the drum: rope that leaves it takes strain energy along, c = E_R F_R / l, eq. (25)."""
         return rope.tension + 0.5 * rope.elastic**2 / self.crane.rope.axial_stiffness
 
     def advance(self, index: int) -> None:
@@ -322,7 +323,7 @@ def simulate(case: DynamicCase | None = None, *, model: FrameModel | None = None
     """Run the full model with rope, load and drum on a moving deck.
 
     Args:
-        case: What happens; default the paper's case with the drum still.
+        case: The run; default the paper's case with the drum still.
         model: The frame's model, if it is not to be the default one (10 and 8 elements).
 
     Warns:

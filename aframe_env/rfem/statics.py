@@ -11,7 +11,7 @@ import numpy as np
 from aframe_env.rfem.banded import BandedCholesky
 from aframe_env.rfem.beam import Array
 from aframe_env.rfem.model import DOWN, FrameModel, frame_model
-from aframe_env.rfem.section_forces import COMPONENTS, Cut, PointForce, SectionForces, von_mises
+from aframe_env.rfem.section_forces import Cut, PointForce, SectionForces, von_mises
 from aframe_env.rfem.structure import members_of
 from aframe_env.scenario.crane import GRAVITY, Vector
 from aframe_env.validation import InvalidValue, require_choice, require_number, require_vector
@@ -29,7 +29,7 @@ of the reference program, whose section forces are constant in an element."""
 
 @dataclass(frozen=True, kw_only=True)
 class LoadCase:
-    """What loads the frame at rest."""
+    """Loads on the frame at rest."""
 
     own_weight: bool = True
     """Own weight of legs and beam."""
@@ -52,11 +52,11 @@ class Station:
     member: str
     """right leg, top beam or left leg."""
     position: float
-    """From the member's first end along the chain A_R → B_R → B_L → A_L, m."""
+    """Distance from the member's first end along the chain A_R → B_R → B_L → A_L, m."""
     along: float
-    """From A_R along the chain, m."""
+    """Distance from A_R along the chain, m."""
     place: Array
-    """In {D}, undeformed, (3,), m."""
+    """Undeformed place in {D}, (3,), m."""
     forces: Array
     """N, V2, V3 (N), T, M2, M3 (N m); (6,)."""
     von_mises: float
@@ -65,7 +65,7 @@ class Station:
 
 @dataclass(frozen=True, kw_only=True)
 class StaticResult:
-    """What a static load case does to the frame. Vectors are along {D}."""
+    """The frame under a static load case. Vectors are along {D}."""
 
     model: FrameModel
     case: LoadCase
@@ -255,6 +255,3 @@ def static(crane: Crane, case: LoadCase, *, model: FrameModel | None = None) -> 
         rotation={name: to_deck @ structure.rotation(name) @ position for name in names},
         section_forces=SectionForces(frame, position, acting, field_strength * (to_deck.T @ DOWN)),
     )
-
-
-__all__ = ["COMPONENTS", "LoadCase", "StaticResult", "Station", "static"]

@@ -24,7 +24,7 @@ def bending_frequencies(
     Args:
         member: The member.
         elements: Number n of primary elements.
-        ends: How its first and last end are held; a beam held too little has frequencies near 0.
+        ends: Supports of its first and last end; a beam held too little has frequencies near 0.
         corrected_shear: See :func:`aframe_env.rfem.beam.divide`.
     """
     segments, springs = divide(member, elements, corrected_shear=corrected_shear)

@@ -1,4 +1,4 @@
-"""The frame as a set of rfes and sdes: right leg, top beam and left leg as one chain, eqs. (8)–(22).
+"""The frame as a set of rfes and sdes: right leg, top beam and left leg, eqs. (8)–(22).
 
 Every rfe has six generalised coordinates, eq. (9): the displacement of its centre of mass and a small
 rotation, both along its own undeformed principal central axes (needed for the mass matrix (14) to be
@@ -22,7 +22,7 @@ OUT_OF_PLANE = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True, kw_only=True)
 class Division:
-    """Into how many primary elements the members are cut."""
+    """Numbers of primary elements of the members."""
 
     leg: int = 10
     """n of either leg, in [1, 10000]."""
@@ -68,7 +68,7 @@ def cross_matrix(vector: Array) -> Array:
 
 
 def body_of(segments: Sequence[Segment]) -> Body:
-    """One rfe of the given segments (two for a corner), in principal central axes."""
+    """Make one rfe of the given segments (two for a corner), in principal central axes."""
     parts = [segment.mass_properties() for segment in segments]
     mass = sum(part[0] for part in parts)
     centre = np.asarray(sum(part[0] * part[1] for part in parts)) / mass
@@ -95,7 +95,7 @@ class Structure:
     bodies: tuple[Body, ...]
     springs: tuple[Spring, ...]
     spring_bodies: tuple[tuple[int, int], ...]
-    """For each spring the bodies before and behind it along the chain."""
+    """Bodies before and behind each spring along the chain."""
     joints: tuple[tuple[int, int, Array], ...]
     """Pairs of bodies that constraints hold rigidly together, with the place in {F}."""
     points: dict[str, tuple[int, Array]]
@@ -221,7 +221,7 @@ def named_points(
 
 
 def one_chain(frame: Frame, division: Division, *, corrected_shear: bool = False) -> Structure:
-    """The paper's new model: one beam of n_1 + n_2 + n_3 + 1 rfes, the corner ones shared."""
+    """Build the paper's new model: one beam of n_1 + n_2 + n_3 + 1 rfes, the corner ones shared."""
     segments: list[tuple[Segment, ...]] = []
     springs: list[Spring] = []
     for index, (pieces, joined) in enumerate(divided_members(frame, division, corrected_shear)):
@@ -238,4 +238,29 @@ def one_chain(frame: Frame, division: Division, *, corrected_shear: bool = False
         spring_bodies=tuple((index, index + 1) for index in range(len(springs))),
         joints=(),
         points=named_points(frame, bodies, corners, corners),
+    )
+
+
+def three_beams(frame: Frame, division: Division, *, corrected_shear: bool = False) -> Structure:
+    """Build the paper's previous model: right leg, top beam and left leg, each a beam of its own with n + 1 rfes.
+
+    It has the same sdes as ``one_chain``; the corner rfes are split in two halves that a rigid joint at B_R and B_L
+    (six reactions each) holds together.
+    """
+    bodies: list[Body] = []
+    springs: list[Spring] = []
+    pairs: list[tuple[int, int]] = []
+    for segments, joined in divided_members(frame, division, corrected_shear):
+        first = len(bodies)
+        bodies += [body_of((segment,)) for segment in segments]
+        springs += joined
+        pairs += [(first + index, first + index + 1) for index in range(len(joined))]
+    leg_end, beam_end = division.leg, division.leg + division.beam + 1
+    joints = [(end, end + 1, bodies[end + 1].segments[0].point(0.0)) for end in (leg_end, beam_end)]
+    return Structure(
+        bodies=tuple(bodies),
+        springs=tuple(springs),
+        spring_bodies=tuple(pairs),
+        joints=tuple(joints),
+        points=named_points(frame, bodies, (leg_end, beam_end + 1), (leg_end + 1, beam_end)),
     )

@@ -36,7 +36,7 @@ def newmark_beta(square: Array, step: float) -> Array:
 
 
 def couples(modal: ModalFrame) -> bool:
-    """Whether the damping couples the modes (normal and tangential not in the ratio of E to G)."""
+    """Return whether the damping couples the modes (normal and tangential not in the ratio of E to G)."""
     diagonal = np.diag(modal.damping)
     return bool(np.max(np.abs(modal.damping - np.diag(diagonal))) > DIAGONAL * np.max(diagonal, initial=1e-300))
 

@@ -73,9 +73,9 @@ class GivenSection:
     shear_factor_3: float
     """κ3, for shear along axis 3; 1 or more."""
     polar_moment: float | None = None
-    """For the rotary inertia about axis 1, m⁴; None for J_2 + J_3."""
+    """Polar moment for the rotary inertia about axis 1, m⁴; None for J_2 + J_3."""
     stress_points: tuple[StressPoint, ...] = ()
-    """Where stress is evaluated; empty: no stresses can be computed."""
+    """Points where stress is evaluated; empty: no stresses can be computed."""
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -341,7 +341,7 @@ class Servomotor:
 
 @dataclass(frozen=True, kw_only=True)
 class FrameStructure:
-    """What the frame is made of; the defaults are the reference crane's."""
+    """Material, sections and servomotors of the frame; the defaults are the reference crane's."""
 
     material: Material = field(default_factory=Material)
     leg_section: MemberSection = field(default_factory=reference_leg_section)

@@ -1,4 +1,4 @@
-"""Motion of the ship's deck: sums of harmonics, and what every kind of ship motion offers.
+"""Motion of the ship's deck: sums of harmonics, and the interface of every kind of ship motion.
 
 The six coordinates of the deck frame {D} are in the order of ``Coordinate``: surge (x, outboard), sway (y),
 heave (z, up) [m], roll, pitch, yaw [rad], ZYX Euler angles, eq. (38).
@@ -71,7 +71,7 @@ class TabledMotion(Protocol):
 
     @property
     def duration(self) -> float:
-        """How long the motion is known, s."""
+        """Time over which the motion is known, s."""
         ...
 
     def table(self, period: float) -> FloatArray:
@@ -84,12 +84,12 @@ ShipMotion = ComponentMotion | TabledMotion
 
 # Attributes, not isinstance: with a protocol that costs as much as the rest of a row's reset.
 def has_components(motion: Any) -> TypeIs[ComponentMotion]:
-    """Whether a motion is a sum of components."""
+    """Return whether a motion is a sum of components."""
     return callable(getattr(motion, "components", None))
 
 
 def is_tabled(motion: Any) -> TypeIs[TabledMotion]:
-    """Whether a motion is known on a table of times."""
+    """Return whether a motion is known on a table of times."""
     return callable(getattr(motion, "table", None)) and hasattr(motion, "duration")
 
 

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +23,6 @@ from aframe_env.scenario.motion import ComplexArray, Components, FloatArray
 from aframe_env.scenario.vessel import Vessel
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
 
-Spectrum = Literal["jonswap", "pierson-moskowitz"]
 SPECTRA: tuple[str, ...] = ("jonswap", "pierson-moskowitz")
 
 FULL_TURN = 2.0 * math.pi
@@ -70,7 +69,7 @@ class Sea:
     components: int = 32
     """Number of wave components."""
     seed: int = 0
-    """Draws frequencies, phases and directions."""
+    """Seed of frequencies, phases and directions."""
 
     def __post_init__(self) -> None:
         require_number("hs", self.hs, "m", low=0.0, high=30.0)

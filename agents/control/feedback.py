@@ -1,4 +1,4 @@
-"""Feed-forward of the pulley's motion with feedback of the load's: what industry runs.
+"""Feed-forward of the pulley's motion with feedback of the load's, as in industrial practice.
 
 The drum takes up whatever the pulley is about to move during the control step, and the regulator moves the rope's end
 to bring the load back to its level: proportional and derivative terms on the depth error and on the rope's stretch,
@@ -61,15 +61,15 @@ class StateFeedback:
 
 @dataclass
 class SensorFeedback:
-    """Feed-forward and feedback of what the sensors tell.
+    """Feed-forward and feedback of the sensors' readings.
 
     The readings are late by ``delay``, taken as whole control steps: the rope's model carries the estimates over it,
-    with what the drum did meanwhile and the pulley's motion as its velocity, acceleration and jerk foretell it.
+    with the drum's turns meanwhile and the pulley's motion as its velocity, acceleration and jerk predict it.
     """
 
     gains: Gains = SENSOR_GAINS
     delay: float = Sensors().delay
-    """From a motion to its reading, s."""
+    """Delay from a motion to its reading, s."""
     name: str = "feed-forward + feedback"
     knows: Knowledge = field(init=False, default=Knowledge.SENSORS)
     _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())

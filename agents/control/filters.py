@@ -1,4 +1,4 @@
-"""What a short memory of the sensors' readings tells, for many rows at once.
+"""Filters over a short memory of the sensors' readings, for many rows at once.
 
 Well-known tools, and no model of the sea: a fading-memory polynomial filter (Morrison, Introduction to Sequential
 Smoothing and Prediction, 1969) for the pulley's velocity and its rates; a complementary filter for the rope, whose
@@ -25,12 +25,12 @@ DEPTH_GAIN = 0.06
 LOAD_GAINS = (0.22, 0.26)
 """Shares of its deviation that correct the load's position, and its velocity (1/s), at each control step."""
 DRUM_RADIUS = 0.75
-"""m, of the reference crane."""
+"""Drum radius of the reference crane, m."""
 
 
 @dataclass(frozen=True)
 class Readings:
-    """One control step's readings of N rows."""
+    """Readings of N rows at one control step."""
 
     heave_rate: FloatArray
     """(N,) vertical velocity of the pulley, m/s."""
@@ -46,7 +46,7 @@ class Readings:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What the readings amount to, as of the moment that they speak of."""
+    """Estimates from the readings, as of the moment of measurement."""
 
     depth_error: FloatArray
     """(N,) m."""
@@ -78,22 +78,22 @@ class FadingPolynomial:
 
     def advance(self, signal: FloatArray) -> None:
         """Take the signal (N,) a control step later."""
-        value, slope, bend = self._terms
-        value, slope = value + slope + bend, slope + 2.0 * bend
+        value, slope, quadratic = self._terms
+        value, slope = value + slope + quadratic, slope + 2.0 * quadratic
         innovation = signal - value
         a, b, c = self._gains
-        self._terms = np.stack([value + a * innovation, slope + b * innovation, bend + c * innovation])
+        self._terms = np.stack([value + a * innovation, slope + b * innovation, quadratic + c * innovation])
 
     def value(self, rows: Rows) -> FloatArray:
         """The signal, smoothed."""
         return np.asarray(self._terms[0, rows])
 
     def rate(self, rows: Rows) -> FloatArray:
-        """Its first derivative, 1/s."""
+        """First derivative of the signal, 1/s."""
         return np.asarray(self._terms[1, rows] / self._period)
 
-    def bend(self, rows: Rows) -> FloatArray:
-        """Its second derivative, 1/s²."""
+    def second_derivative(self, rows: Rows) -> FloatArray:
+        """Second derivative of the signal, 1/s²."""
         return np.asarray(2.0 * self._terms[2, rows] / self._period**2)
 
 
@@ -108,7 +108,7 @@ class Estimator:
         self._position = np.zeros(rows)
         """Depth error of the load, m."""
         self._velocity = np.zeros(rows)
-        """Of the load, m/s."""
+        """Velocity of the load, m/s."""
         self._last_heave_rate = np.zeros(rows)
         self._last_drum_angle = np.zeros(rows)
         self._last_depth = np.zeros(rows)
@@ -148,7 +148,7 @@ class Estimator:
             depth_error=self._position[rows],
             pulley_velocity=self._heave.value(rows),
             pulley_acceleration=self._heave.rate(rows),
-            pulley_jerk=self._heave.bend(rows),
+            pulley_jerk=self._heave.second_derivative(rows),
             load_velocity=self._velocity[rows],
             stretch=self._rope_end[rows] - self._position[rows],
         )

@@ -1,4 +1,4 @@
-"""Inverse dynamics: the drum that a load at rest would need, from the ship's exact motion."""
+"""Inverse dynamics: the drum's motion that holds the load at rest, from the ship's exact motion."""
 
 from __future__ import annotations
 
@@ -65,9 +65,9 @@ class RequiredRope:
 
 @dataclass
 class InverseDynamics:
-    """Pay out what holds the load at its level, which keeps the rope's tension at its weight: the whole future known.
+    """Pay out the rope that holds the load at its level, its tension at the weight: the whole future is known.
 
-    What it leaves is what the winch's limits leave; the regulator calms what they have stirred.
+    Errors remain only where the winch's limits cause them; the regulator damps these.
     """
 
     gains: Gains = GAINS

@@ -1,4 +1,4 @@
-"""Kalman filters that tell agents, from their sensors, where the load is and where the pulley goes.
+"""Kalman filters that estimate the load's place and predict the pulley's path from the sensors.
 
 Dead reckoning by the heave rate drifts by centimetres, and the depth sensor is too coarse and too slow to hold it. But
 a ship in waves moves within a band of frequencies: ``WaveFilter`` holds its heave as a bank of oscillators of that
@@ -23,7 +23,7 @@ ComplexArray = npt.NDArray[np.complex128]
 
 @dataclass(frozen=True, kw_only=True)
 class WaveBank:
-    """The oscillators, and what the filter counts on."""
+    """Oscillators of the filter, and its noise model."""
 
     lowest: float = 0.3
     """rad/s."""
@@ -33,30 +33,30 @@ class WaveBank:
     damping: float = 0.002
     """Rate at which an oscillator forgets, 1/s."""
     variance: float = 0.06
-    """Of the heave rate, spread evenly over the bands, m²/s²."""
+    """Variance of the heave rate, spread evenly over the bands, m²/s²."""
     build_up: float = 10.0
     """Time over which the motion comes up to that variance at the start of a lift, s."""
     rate_noise: float = 0.01
     """Standard deviation of a reading of the heave rate, m/s."""
     depth_noise: float = 0.06
-    """Standard deviation of a reading of the depth beside what else is estimated, m."""
+    """Standard deviation of a reading of the depth, m."""
     offset_drift: float = 1e-7
     """Variance by which the offset between heave and depth grows, m²/s."""
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """Gains of K control steps; the last ones, a period of the depth sensor, are those of all steps to come."""
+    """Gains of K control steps; those of the last period of the depth sensor repeat from then on."""
 
     rate: ComplexArray
-    """(K, bands + 1) of a reading of the heave rate, on the oscillators and on the offset."""
+    """(K, bands + 1) gains of a reading of the heave rate, on the oscillators and on the offset."""
     depth: ComplexArray
-    """(K, bands + 1) of a reading of the depth; zero where there is none."""
+    """(K, bands + 1) gains of a reading of the depth; zero where there is none."""
     hold: int
     """Control steps between two readings of the depth."""
 
     def index(self, step: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-        """Which gains hold at these steps since the start of a lift."""
+        """Index of the gains at these steps since the start of a lift."""
         beyond = len(self.rate) - self.hold
         return np.where(step < beyond, step, beyond + (step - beyond) % self.hold)
 
@@ -66,7 +66,7 @@ def schedule(bank: WaveBank, period: float, hold: int) -> Schedule:
     """Gains of the Kalman filter for a ship at rest at the start, by the recursion of its covariance over 60 s."""
     steps = hold * round(60.0 / period / hold) + hold
     exponent = _exponents(bank)
-    turn = np.append(np.exp(exponent * period), 1.0)[:, None]
+    transition = np.append(np.exp(exponent * period), 1.0)[:, None]
     rate = np.append(np.tile([1.0, 0.0], bank.bands), 0.0)
     inverse = 1.0 / exponent
     depth = np.append(np.stack([inverse.real, -inverse.imag], axis=1).ravel(), 1.0)
@@ -75,28 +75,28 @@ def schedule(bank: WaveBank, period: float, hold: int) -> Schedule:
     covariance = np.diag(np.append(np.zeros(2 * bank.bands), 1e-6))
     gains = np.zeros((2, steps, 2 * bank.bands + 1))
     for step in range(1, steps):
-        covariance = _turned(turn, _turned(turn, covariance).T)
+        covariance = _propagated(transition, _propagated(transition, covariance).T)
         rising = step * period < bank.build_up
         grow = 2.0 * period / bank.build_up if rising else -np.expm1(-2.0 * bank.damping * period)
         covariance[moving, moving] += 2.0 * share * grow
         covariance[-1, -1] += bank.offset_drift * period
         for kind, row, noise in ((0, rate, bank.rate_noise), (1, depth, bank.depth_noise)):
             if kind == 0 or step % hold == 0:
-                seen = (covariance * row).sum(axis=1)
-                gains[kind, step] = seen / ((row * seen).sum() + noise**2)
-                covariance -= np.outer(gains[kind, step], seen)
+                cross_covariance = (covariance * row).sum(axis=1)
+                gains[kind, step] = cross_covariance / ((row * cross_covariance).sum() + noise**2)
+                covariance -= np.outer(gains[kind, step], cross_covariance)
     paired = gains[..., :-1:2] + 1j * gains[..., 1::2]
     both = np.concatenate([paired, gains[..., -1:]], axis=-1)
     return Schedule(both[0], both[1], hold)
 
 
-def _turned(turn: ComplexArray, columns: FloatArray) -> FloatArray:
+def _propagated(transition: ComplexArray, columns: FloatArray) -> FloatArray:
     """Columns (2 bands + 1, n) of oscillators, real and imaginary parts in turn, a control step later.
 
     No matrix product: the last digit of such a one depends on the threads that happen to share it.
     """
     pairs = np.concatenate([columns, np.zeros_like(columns[:1])])
-    later = turn * (pairs[::2] + 1j * pairs[1::2])
+    later = transition * (pairs[::2] + 1j * pairs[1::2])
     return np.stack([later.real, later.imag], axis=1).reshape(pairs.shape)[:-1]
 
 
@@ -105,14 +105,14 @@ def _exponents(bank: WaveBank) -> ComplexArray:
 
 
 class WaveFilter:
-    """The pulley's heave, and what it will be, for N rows."""
+    """Estimate and prediction of the pulley's heave, for N rows."""
 
     def __init__(self, rows: int, control_period: float, hold: int, bank: WaveBank | None = None) -> None:
         """``hold``: control steps between two readings of the depth."""
         bank = bank or WaveBank()
         self._schedule = schedule(bank, control_period, hold)
         self._exponent = _exponents(bank)
-        self._turn = np.append(np.exp(self._exponent * control_period), 1.0)
+        self._transition = np.append(np.exp(self._exponent * control_period), 1.0)
         self._state = np.zeros((rows, bank.bands + 1), dtype=np.complex128)
         """The heave rate is the sum of the real parts of all but the last, m/s; the last is the offset, m."""
         self._step = np.zeros(rows, dtype=np.int64)
@@ -125,12 +125,12 @@ class WaveFilter:
     def advance(self, heave_rate: FloatArray) -> None:
         """Take a reading (N,) m/s of the pulley's heave rate, a control step later."""
         self._step += 1
-        self._state *= self._turn
+        self._state *= self._transition
         innovation = heave_rate - self._state[:, :-1].real.sum(axis=1)
         self._state += innovation[:, None] * self._schedule.rate[self._schedule.index(self._step)]
 
     def correct(self, innovation: FloatArray) -> None:
-        """Take what a reading of the depth misses (N,) m, heeded in the steps that have one."""
+        """Take the innovation (N,) m of the depth; it counts in the steps that have a reading."""
         self._state += innovation[:, None] * self._schedule.depth[self._schedule.index(self._step)]
 
     def heave(self) -> FloatArray:
@@ -138,7 +138,7 @@ class WaveFilter:
         return np.asarray((self._state[:, :-1] / self._exponent).real.sum(axis=1) + self._state[:, -1].real)
 
     def rate(self, times: FloatArray) -> FloatArray:
-        """Velocity (T, N) m/s of the pulley, ``times`` (T,) s after the moment that the reading speaks of."""
+        """Velocity (T, N) m/s of the pulley, ``times`` (T,) s after the latest reading's moment of measurement."""
         return self._sum(np.exp(np.outer(times, self._exponent)))
 
     def path(self, times: FloatArray) -> FloatArray:
@@ -151,7 +151,7 @@ class WaveFilter:
 
 
 ACCELERATION_NOISE = 0.02
-"""m/s², of the load beside what its bobbing explains."""
+"""Process noise of the load's acceleration beside its bobbing, m/s²."""
 
 
 class RopeFilter:
@@ -161,7 +161,7 @@ class RopeFilter:
     """
 
     def __init__(self, rows: int, rate_noise: float) -> None:
-        """``rate_noise`` of a reading of the heave rate, m/s."""
+        """``rate_noise``: standard deviation of a reading of the heave rate, m/s."""
         self._rate_noise = rate_noise
         self._a, self._b = np.zeros((rows, 3, 3)), np.zeros((rows, 3))
         self._process_noise, self._covariance = np.zeros((rows, 3, 3)), np.zeros((rows, 3, 3))
@@ -184,17 +184,17 @@ class RopeFilter:
         a = self._a
         x = (a @ self._x[:, :, None])[:, :, 0] + self._b * speed[:, None]
         p = a @ self._covariance @ a.transpose(0, 2, 1) + self._process_noise
-        seen = p[:, :, 2] - p[:, :, 0]
-        gain = seen / (seen[:, 2] - seen[:, 0] + self._noise)[:, None]
+        cross_covariance = p[:, :, 2] - p[:, :, 0]
+        gain = cross_covariance / (cross_covariance[:, 2] - cross_covariance[:, 0] + self._noise)[:, None]
         self._x = x + gain * (stretch - (x[:, 2] - x[:, 0]))[:, None]
-        self._covariance = p - gain[:, :, None] * seen[:, None, :]
+        self._covariance = p - gain[:, :, None] * cross_covariance[:, None, :]
 
     @property
     def stretch(self) -> FloatArray:
-        """Of the rope beyond that under the load's weight, (N,) m."""
+        """Stretch of the rope beyond that under the load's weight, (N,) m."""
         return np.asarray(self._x[:, 2] - self._x[:, 0])
 
     @property
     def load_velocity(self) -> FloatArray:
-        """(N,) m/s."""
+        """Vertical velocity of the load, (N,) m/s."""
         return np.asarray(self._x[:, 1])

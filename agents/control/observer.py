@@ -1,4 +1,4 @@
-"""From late and noisy readings to the present: the rope's state now, and where the pulley goes next."""
+"""Observers from late and noisy readings: the rope's state now, and the pulley's path to come."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from agents.control.regulator import Columns, HoistBatch
 
 
 class Observer(ABC):
-    """The present of N rows, whose readings are late by whole control steps.
+    """Present state of N rows, whose readings are late by whole control steps.
 
-    The rope's model carries the estimates over the delay, with what the drums did meanwhile and what is foretold of
-    the pulleys' motion.
+    The rope's model carries the estimates over the delay, with the drums' turns meanwhile and the predicted motion of
+    the pulleys.
     """
 
     def __init__(self, hoists: HoistBatch, damping_ratio: float, delay: float) -> None:
@@ -26,7 +26,7 @@ class Observer(ABC):
         self._damping_ratio = damping_ratio
         self.model = hoists.model(damping_ratio)
         self._turns = np.zeros((round(delay / hoists.period), len(hoists.frequency)))
-        """(steps of delay, N) how far the drums have turned since the moment that the readings speak of, rad."""
+        """(steps of delay, N) turns of the drums since the moment of measurement, rad."""
 
     def start(self, o: Columns, rows: Rows = ALL) -> None:
         """Begin hoists, as ``hoists`` has, in these rows with the first readings (n,)."""
@@ -53,7 +53,7 @@ class Observer(ABC):
         return z
 
     def rises(self, steps: int) -> FloatArray:
-        """How far the pulley will rise during each of the coming control steps, (steps, N) m."""
+        """Rise of the pulley during each of the coming control steps, (steps, N) m."""
         return np.diff(self._path(self._times(steps + 1)), axis=0)
 
     def pulley_velocity(self, steps: int) -> FloatArray:
@@ -61,7 +61,7 @@ class Observer(ABC):
         return self._rate(self._times(steps))
 
     def _times(self, count: int) -> FloatArray:
-        """Now and the ends of the coming control steps, s after the moment that the readings speak of."""
+        """Now and the ends of the coming control steps, s after the moment of measurement."""
         return self._hoists.period * np.arange(len(self._turns), len(self._turns) + count, dtype=np.float64)
 
     @abstractmethod
@@ -78,15 +78,15 @@ class Observer(ABC):
 
     @abstractmethod
     def _path(self, times: FloatArray) -> FloatArray:
-        """Rise (T, N) m of the pulley ``times`` (T,) s after the moment that the readings speak of."""
+        """Rise (T, N) m of the pulley ``times`` (T,) s after the moment of measurement."""
 
     @abstractmethod
     def _rate(self, times: FloatArray) -> FloatArray:
-        """Its velocity (T, N) m/s."""
+        """Velocity (T, N) m/s of the pulley at these times."""
 
 
 class PolynomialObserver(Observer):
-    """Carries on with the pulley's velocity, acceleration and jerk, as ``Estimator`` finds them.
+    """Extrapolation of the pulley's velocity, acceleration and jerk, as ``Estimator`` finds them.
 
     It has no model of the sea: good for a fraction of a wave.
     """
@@ -126,10 +126,10 @@ class PolynomialObserver(Observer):
 
 
 class KalmanObserver(Observer):
-    """Follows the pulley by a bank of waves and the load by its bobbing on the rope, each with a Kalman filter."""
+    """Kalman filters of the pulley, as a bank of waves, and of the load, bobbing on its rope."""
 
     def __init__(self, hoists: HoistBatch, damping_ratio: float, sensors: Sensors) -> None:
-        """``sensors``: their delay and noise are counted on."""
+        """``sensors``: delay and noise that the filters are designed for."""
         super().__init__(hoists, damping_ratio, sensors.delay)
         rows, hold = len(hoists.frequency), max(1, round(sensors.depth_error.period / hoists.period))
         self._tension = sensors.tension

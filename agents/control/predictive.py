@@ -1,7 +1,7 @@
 """Model-predictive control: the regulator's problem over a horizon, with the winch's limits.
 
-Least Σ e² + effort c² + zᵀ P z at the horizon's end, over the changes c of the rope end's speed, so that the drum's
-speed and acceleration stay within the winch's limits while the pulley moves as foretold. Where the regulator itself
+Minimise Σ e² + effort c² + zᵀ P z at the horizon's end, over the changes c of the rope end's speed, so that the drum's
+speed and acceleration stay within the winch's limits while the pulley moves as predicted. Where the regulator itself
 keeps the limits all along the horizon, its answer is the problem's; only the other rows need a quadratic program.
 """
 
@@ -43,7 +43,7 @@ class Problem:
         self._solver: Any = None
 
     def gradient(self, z: FloatArray) -> FloatArray:
-        """(H,) from the state z (4,)."""
+        """Gradient (H,) of the cost at the state z (4,)."""
         return np.asarray(self._gradient @ z)
 
     def solve(self, z: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
@@ -76,16 +76,16 @@ class Problem:
 
 @dataclass
 class PredictiveControl:
-    """Model-predictive control on the sensors; the Kalman filters that the agents have too foretell the motion."""
+    """Model-predictive control on the sensors; the agents' Kalman filters predict the motion."""
 
     effort: float = 0.026
-    """Price of changing the rope end's speed, s²; that of the feedback law beside it."""
+    """Weight on changes of the rope end's speed, s²; that of the feedback law beside it."""
     horizon: int = 25
     """Control steps."""
     damping_ratio: float = 0.03
-    """Damping of the load's bobbing on the rope that the law counts on, share of critical."""
+    """Damping of the load's bobbing on the rope that the law is designed for, share of critical."""
     sensors: Sensors = field(default_factory=Sensors)
-    """Delay and noise that the law counts on."""
+    """Delay and noise that the law is designed for."""
     name: str = "predictive control"
     knows: Knowledge = field(init=False, default=Knowledge.SENSORS)
     _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())

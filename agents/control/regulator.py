@@ -1,4 +1,4 @@
-"""The feedback law that the control policies share, and what it needs to know of the hoists at hand."""
+"""The feedback law that the control policies share, and the hoists that it acts on."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ Columns = dict[str, FloatArray]
 
 @dataclass(frozen=True, kw_only=True)
 class Gains:
-    """What is tuned of the law."""
+    """Gains of the feedback law."""
 
     effort: float
-    """Price of changing the rope end's speed, s²: m² of squared depth error per (m/s)²."""
+    """Weight on changes of the rope end's speed, s²: m² of squared depth error per (m/s)²."""
     share: float
-    """Share of the winch's acceleration that feedback may count on; the rest is the feed-forward's."""
+    """Share of the winch's acceleration that feedback may use; the rest is the feed-forward's."""
     damping_ratio: float = 0.03
-    """Damping of the load's bobbing on the rope that the law counts on, share of critical."""
+    """Damping of the load's bobbing on the rope that the law is designed for, share of critical."""
 
     def __post_init__(self) -> None:
         require_number("effort", self.effort, "s²", low=1e-8, high=1e8)
@@ -39,7 +39,7 @@ class Gains:
 
 @dataclass(frozen=True)
 class Regulator:
-    """Linear-quadratic regulator of the rope's end, kept within what the winch can do beside the feed-forward.
+    """Linear-quadratic regulator of the rope's end, kept within the winch's limits beside the feed-forward.
 
     A plain linear law winds up where the sea asks for all that the winch has: it asks for more, gets it late, and
     drives the load's bobbing on. So the rope's end moves at most ``amplitude`` to calm the bobbing, and approaches
@@ -64,7 +64,7 @@ class Regulator:
 
 
 class HoistBatch:
-    """Winches, loads and ropes of N rows, as far as a policy may know them: the crane, and what it observes."""
+    """Winches, loads and ropes of N rows, as far as a policy may know them from crane and observation."""
 
     def __init__(self, rows: int, control_period: float, quantities: tuple[Quantity, ...]) -> None:
         self.period = control_period

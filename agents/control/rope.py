@@ -1,4 +1,4 @@
-"""The load on its elastic rope, linear and sampled: what the feedback laws are designed on.
+"""Linear sampled model of the load on its elastic rope, for the design of the feedback laws.
 
 The state is z = (e, e', q, p): depth error e, its rate, q, where the load would come to rest if the upper end of the
 rope stayed as it is, and p = q'. The pulley raises q and the drum, paying out, lowers it: p = s' - r φ'. The load
@@ -51,7 +51,7 @@ class RopeModel:
         return np.asarray((self.a @ z[:, :, None])[:, :, 0] + self.b * change[:, None])
 
     def costs_to_go(self, effort: float) -> FloatArray:
-        """P (N, 4, 4) of the least Σ e² + ``effort`` c² over an endless future: zᵀ P z; effort in s²."""
+        """P (N, 4, 4) of the cost to go zᵀ P z: least Σ e² + ``effort`` c² over an infinite horizon; effort in s²."""
         weight = np.diag([1.0, 0.0, 0.0, 0.0])
         return np.stack(
             [

@@ -1,4 +1,4 @@
-"""The winch inverted: which command turns the drum by a wanted angle during a control step."""
+"""Inverse of the winch: the command that turns the drum by a wanted angle during a control step."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class WinchModel:
         self.speed[rows] = 0.0
 
     def command(self, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Commands (N,) rad/s that turn the drums by ``turn`` (N,) rad, or as near as may be, and how far they turn.
+        """Find commands (N,) rad/s that turn the drums by ``turn`` (N,) rad, or as near as may be, and their turns.
 
         The reckoned speed is carried to the end of the control step.
         """
@@ -45,13 +45,13 @@ class WinchModel:
         return command, self.turn(command)
 
     def invert(self, turn: FloatArray) -> FloatArray:
-        """Commands (N,) rad/s that would turn the drums by ``turn`` (N,) rad, or as near as may be."""
+        """Find commands (N,) rad/s that would turn the drums by ``turn`` (N,) rad, or as near as may be."""
         command = np.empty_like(turn)
         _kernels().invert(self.speed, self.max_speed, self.max_acceleration, self._lag, self._period, turn, command)
         return command
 
     def turn(self, command: FloatArray) -> FloatArray:
-        """How far the drums turn (N,) rad at these commands (N,) rad/s; the reckoned speed is carried on."""
+        """Find turns (N,) rad of the drums at these commands (N,) rad/s, and carry the reckoned speed on."""
         turned = np.empty_like(command)
         limited = np.clip(command, -self.max_speed, self.max_speed)
         _kernels().follow(self.speed, self.max_acceleration, self._lag, self._period, limited, turned)
@@ -73,7 +73,7 @@ def _advance(command: float, speed: float, acceleration: float, lag: float, peri
 
 @scalar
 def command_for(turn: float, speed: float, limit: float, acceleration: float, lag: float, period: float) -> float:
-    """Command [rad/s] within ± ``limit`` that turns the drum by ``turn`` [rad] in a control step, or nearly so."""
+    """Find the command [rad/s] within ± ``limit`` that turns the drum by ``turn`` [rad] in a control step, if any."""
     low, high = -limit, limit
     middle = 0.0
     for _ in range(_BISECTIONS):

@@ -1,4 +1,4 @@
-"""The winch inverted on a CUDA device, one thread a winch."""
+"""Inverse of the winch on a CUDA device, one thread a winch."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _THREADS = 128
 
 
 def invert(turn: Any, speed: Any, limit: float, acceleration: float, lag: float, period: float, command: Any) -> None:
-    """Kernel: ``command`` (N,) of equal winches for wanted turns (N,) in a control step."""
+    """Kernel: find ``command`` (N,) of equal winches for wanted turns (N,) in a control step."""
     i = cuda.grid(1)
     if i < turn.shape[0]:
         command[i] = command_for(turn[i], speed[i], limit, acceleration, lag, period)
@@ -27,8 +27,8 @@ def _kernel() -> Any:
     return cuda.jit(invert)
 
 
-def find_commands(winch: Winch, period: float, turn: torch.Tensor, speed: torch.Tensor) -> torch.Tensor:
-    """Commands (N,) rad/s that turn equal winches by ``turn`` (N,) rad in ``period`` s, or as near as may be.
+def invert_winches(winch: Winch, period: float, turn: torch.Tensor, speed: torch.Tensor) -> torch.Tensor:
+    """Find commands (N,) rad/s that turn equal winches by ``turn`` (N,) rad in ``period`` s, or as near as may be.
 
     ``speed`` (N,) rad/s: the drums' speed now. All float64, on one device.
     """

@@ -1,4 +1,4 @@
-"""Heave of the crane's tip (the pulley S) as harmonics: what a drive map is asked for.
+"""Heave of the crane's tip (the pulley S) as harmonics, for which a drive map gives a drive.
 
 Two ways to know them: from the waves themselves, which is to know the whole future, and from a record of the heave
 made before the start, which is what an operator has.
@@ -39,7 +39,7 @@ class Harmonics:
         return np.asarray(np.sin(times[:, None] * self.frequency + self.phase) @ self.amplitude)
 
     def scaled(self, factor: float) -> Harmonics:
-        """The same with all amplitudes times a factor."""
+        """Scale all amplitudes by a factor."""
         return Harmonics(factor * self.amplitude, self.frequency, self.phase)
 
 
@@ -99,7 +99,7 @@ def fit_harmonics(times: FloatArray, signal: FloatArray, count: int) -> Harmonic
 
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
-    """A record of the tip's heave before the start, and how a forecast is made of it.
+    """A record of the tip's heave before the start, and the forecast from it.
 
     As many harmonics are taken as have best forecast later parts of the same record from earlier ones, and as much of
     them as the worst of those forecasts was worth: all of a regular wave, nothing of a sea in which nothing lasts.
@@ -110,7 +110,7 @@ class Measurement:
     window: float = 120.0
     """Length of the part that harmonics are fitted to, s."""
     horizon: float = 60.0
-    """How far ahead the forecasts are judged, s."""
+    """Time ahead over which the forecasts are judged, s."""
     trials: int = 3
     """Forecasts within the record that the number of harmonics is chosen by."""
     most: int = 3

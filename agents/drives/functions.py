@@ -1,6 +1,6 @@
 """Open-loop drives: the drum angle as a function of time, φ_H(t) with φ_H(0) = 0.
 
-The source's eqs. (33)-(36) name a cubic spline and a "pseudo-harmonic" function and their decision variables;
+The paper's eqs. (33)-(36) name a cubic spline and a "pseudo-harmonic" function and their decision variables;
 its exact text is not available to us. Each class below says which form it takes.
 """
 
@@ -28,7 +28,7 @@ class Drive(Protocol):
 
     @property
     def duration(self) -> float:
-        """t_k: how long the drive was made for, s."""
+        """Duration t_k that the drive was made for, s."""
         ...
 
     def angle(self, time: npt.ArrayLike) -> FloatArray:
@@ -41,7 +41,7 @@ class Drive(Protocol):
 
     @property
     def variables(self) -> FloatArray:
-        """The vector of decision variables."""
+        """Vector of decision variables."""
         ...
 
 
@@ -202,8 +202,8 @@ def harmonic_samples(variables: FloatArray, times: FloatArray) -> tuple[FloatArr
     return angle, speed
 
 
-def harmonic_tangents(variables: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Derivatives (T, 3 n) of angle and speed of the ``HarmonicDrive`` by its variables."""
+def harmonic_jacobian(variables: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Jacobians (T, 3 n) of angle and speed of the ``HarmonicDrive`` by its variables."""
     a, w, p = variables.reshape(-1, 3).T
     t = times[:, None]
     argument = w * t + p

@@ -1,4 +1,4 @@
-"""The source's "map of basic drive functions": stored optimal drives, approximated in between.
+"""The paper's "map of basic drive functions": stored optimal drives, approximated in between.
 
 Each node of the map is one regular heave of the crane's tip, a load and a rope; stored is the best pseudo-harmonic
 drive for it, as the complex ratio of the rope that it pays out to that heave (its argument is the lead of the drive).
@@ -53,12 +53,12 @@ class Node:
     damping_ratio: float = 0.03
     """Damping of the load's bobbing on the rope, share of critical."""
     periods: float = 6.0
-    """How long the drive is optimised over."""
+    """Duration that the drive is optimised over, in periods."""
     crane: Crane = field(default_factory=Crane)
 
     @property
     def scenario(self) -> Scenario:
-        """The load starts at rest, under a tip that moves upwards from the middle of its stroke."""
+        """Scenario of the node: the load starts at rest, the tip moving upwards from the middle of its stroke."""
         heave = Harmonic(coordinate="heave", amplitude=self.amplitude, period=self.period)
         case = Scenario(
             crane=self.crane,
@@ -72,7 +72,7 @@ class Node:
 
 @dataclass(frozen=True)
 class NodeDrive:
-    """What the optimum of a node is."""
+    """Optimum of a node."""
 
     real: float
     """Real and imaginary part of rope paid out over the tip's heave, both at the heave's frequency."""
@@ -85,7 +85,7 @@ class NodeDrive:
 def optimise_node(node: Node) -> NodeDrive:
     """Find the best pseudo-harmonic drive (one harmonic, Ω1) of a node.
 
-    The search starts well off, with half the heave and 0.3 rad late: what it finds owes nothing to a good guess.
+    The search starts well off, with half the heave and 0.3 rad late: its result owes nothing to a good guess.
     """
     scenario, duration = node.scenario, node.periods * node.period
     radius = scenario.crane.winch.drum_radius
@@ -103,12 +103,12 @@ def optimise_node(node: Node) -> NodeDrive:
 
 @dataclass(frozen=True)
 class MapCard:
-    """What must be known of a map, beside its arrays."""
+    """Description of a map, beside its arrays."""
 
     command: str
     versions: dict[str, str]
     sha256: str
-    """Of the file of arrays."""
+    """sha256 of the file of arrays."""
     format: int = FORMAT
 
 

@@ -1,4 +1,4 @@
-"""The drive map as a policy: drives put together from the map for what was measured at the start."""
+"""The drive map as a policy: drives put together from the map for the heave measured before the start."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class DriveMapPolicy:
     drive_map: DriveMap
     measurement: Measurement | None = field(default_factory=Measurement)
     duration: float = 60.0
-    """How long the drives run, s; the drum stands still afterwards."""
+    """Duration of the drives, s; the drum stands still afterwards."""
     name: str = field(init=False)
     knows: Knowledge = field(init=False)
     measured: str = field(init=False)
-    """What it is told at the start."""
+    """Knowledge given at the start, in words."""
     _follower: Follower = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -45,7 +45,7 @@ class DriveMapPolicy:
             )
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
-        """Begin N episodes, each with a drive for what was measured at its start."""
+        """Begin N episodes, each with a drive for the heave measured before its start."""
         drives = [
             self.drive_map.drive(
                 scenario,

@@ -1,6 +1,6 @@
 """Objectives (31) and (32) of a prescribed drum angle, evaluated by the package's own integrator.
 
-Ω1 = ∫ (x_L3 - h)² dt [m² s], Ω2 = max |x_L3 - h| [m] over [0, t_k] on the simplified model. As in the source,
+Ω1 = ∫ (x_L3 - h)² dt [m² s], Ω2 = max |x_L3 - h| [m] over [0, t_k] on the simplified model. As in the paper,
 the drum follows the drive exactly: the winch has no limits here, and the rope does not part.
 """
 
@@ -33,12 +33,12 @@ FINE_STEP: Final = 0.01
 COARSE_STEP: Final = 0.05
 """Longest inner step while searching, s."""
 COARSE_PHASE: Final = 0.2
-"""Most that the load's bobbing on the rope turns in an inner step while searching, rad."""
+"""Greatest phase of the load's bobbing on the rope in an inner step while searching, rad."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a drive does to the load."""
+    """Result of a drive for the load."""
 
     omega1: float
     """Ω1, m² s."""
@@ -68,7 +68,7 @@ def coarse_step(scenario: Scenario) -> float:
 
 
 class _Drum(NamedTuple):
-    """What turns a drum angle into a rope."""
+    """Constants that turn a drum angle into a length of rope."""
 
     radius: float
     """m."""
@@ -194,12 +194,12 @@ class Objective:
         self.evaluate(angle, speed)
         return self._errors.copy()
 
-    def errors_beside(
+    def perturbed_errors(
         self, angle: FloatArray, speed: FloatArray, more_angle: FloatArray, more_speed: FloatArray
     ) -> FloatArray:
-        """x_L3 - h (steps + 1, n) m of n neighbours of a drive: ``more_angle``, ``more_speed`` (times, n) are added.
+        """x_L3 - h (steps + 1, n) m under n perturbed drives: ``more_angle``, ``more_speed`` (times, n) are added.
 
-        The neighbours run side by side, in the lanes of the processor's registers.
+        They run side by side, in the lanes of the processor's registers.
         """
         errors = np.empty((self.steps + 1, more_angle.shape[1]))
         _lanes_kernel()(self.path, angle, speed, more_angle, more_speed, self._row, self.step, errors)

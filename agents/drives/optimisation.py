@@ -25,8 +25,8 @@ from agents.drives.functions import (
     Drive,
     HarmonicDrive,
     SplineDrive,
+    harmonic_jacobian,
     harmonic_samples,
-    harmonic_tangents,
     spline_matrices,
     uniform_harmonic_samples,
 )
@@ -51,7 +51,7 @@ _LEAST_SCALE = 0.02  # m of rope: a harmonic smaller than this is scaled as if i
 
 @dataclass(frozen=True, kw_only=True)
 class OptimisedDrive:
-    """A drive, what it was optimised for, and what it does on its scenario (without the winch's limits)."""
+    """A drive, its objective, and its result on its scenario (without the winch's limits)."""
 
     drive: Drive
     family: str
@@ -67,7 +67,7 @@ class OptimisedDrive:
     amplitude: float
     """Greatest distance of the load from its required level, m (equal to Ω2 by its definition)."""
     evaluations: int
-    """Times that an objective was evaluated while searching, a start from the Ω1 optimum included."""
+    """Number of evaluations of an objective while searching, a start from the Ω1 optimum included."""
     seconds: float
     """Wall-clock time of the search."""
 
@@ -76,7 +76,7 @@ def required_angle(objective: Objective) -> FloatArray:
     """Drum angle [rad] at the objective's times that would hold the load at h right below where the ship rests.
 
     The rope's law solved for the unstretched length at a tension equal to the weight: what remains to be found by
-    optimisation is the pendulum's share, the start's transient, and what the family of drives can not follow.
+    optimisation is the pendulum's share, the start's transient, and the part that the family of drives cannot follow.
     """
     scenario = objective.scenario
     crane = scenario.crane
@@ -124,7 +124,7 @@ def optimise(
     coarse = Objective(scenario, duration, coarse_step(scenario))
     guess = _spline_guess(coarse, intervals, given) if family == "spline" else _harmonic_guess(coarse, harmonics, given)
     first = max_evaluations if objective == "omega1" else max(1, max_evaluations // 2)
-    search = _Search(coarse, max_evaluations, np.random.default_rng(seed), progress)
+    search = _Search(coarse, np.random.default_rng(seed), progress)
     if optimiser == "gauss-newton":
         x, search.evaluations = _gauss_newton(coarse, guess, first, progress)
     else:
@@ -149,16 +149,16 @@ def optimise(
 
 @dataclass(frozen=True)
 class _Guess:
-    """Where a search starts, and the family that it searches in."""
+    """Starting point of a search, and the family of drives."""
 
     x: FloatArray
     """Decision variables."""
     scale: FloatArray
-    """What moves about one metre of rope, for each variable."""
+    """Change of each variable that moves about one metre of rope."""
     sample: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
     """Angle and speed (T,) of a drive at the objective's times, from its variables (n,)."""
-    tangents: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-    """Their derivatives (T, n) by the variables."""
+    jacobian: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+    """Jacobians (T, n) of angle and speed by the variables."""
 
 
 def _spline_guess(objective: Objective, intervals: int, given: FloatArray | None) -> _Guess:
@@ -170,7 +170,7 @@ def _spline_guess(objective: Objective, intervals: int, given: FloatArray | None
         x=np.asarray(x, dtype=np.float64),
         scale=scale,
         sample=lambda v: (angle @ v, speed @ v),
-        tangents=lambda v: (angle, speed),
+        jacobian=lambda v: (angle, speed),
     )
 
 
@@ -189,7 +189,7 @@ def _harmonic_guess(objective: Objective, harmonics: int, given: FloatArray | No
         x=x,
         scale=scale,
         sample=lambda v: uniform_harmonic_samples(v, step, count),
-        tangents=lambda v: harmonic_tangents(v, times),
+        jacobian=lambda v: harmonic_jacobian(v, times),
     )
 
 
@@ -202,7 +202,7 @@ def _fitted_harmonics(times: FloatArray, needed: FloatArray, harmonics: int) -> 
         return harmonic_samples(v, t)[0] - y
 
     def jacobian(v: FloatArray) -> FloatArray:
-        return harmonic_tangents(v, t)[0]
+        return harmonic_jacobian(v, t)[0]
 
     x = np.empty(0)
     for _ in range(harmonics):
@@ -257,9 +257,9 @@ def _gauss_newton(
         nonlocal evaluations
         evaluations += size
         angle, speed = guess.sample(variables(y))
-        more = [_NEIGHBOUR * guess.scale * each for each in guess.tangents(variables(y))]
-        beside = objective.errors_beside(angle, speed, *more)
-        return np.asarray(weight[:, None] * (beside - objective.errors(angle, speed)[:, None]) / _NEIGHBOUR)
+        more = [_NEIGHBOUR * guess.scale * each for each in guess.jacobian(variables(y))]
+        perturbed = objective.perturbed_errors(angle, speed, *more)
+        return np.asarray(weight[:, None] * (perturbed - objective.errors(angle, speed)[:, None]) / _NEIGHBOUR)
 
     found = least_squares(
         error,
@@ -276,10 +276,9 @@ def _gauss_newton(
 class _Search:
     """Nelder-Mead with restarts, counting its evaluations."""
 
-    def __init__(self, objective: Objective, budget: int, rng: np.random.Generator, progress: Progress | None) -> None:
+    def __init__(self, objective: Objective, rng: np.random.Generator, progress: Progress | None) -> None:
         self.objective = objective
         self.evaluations = 0
-        self._budget = budget
         self._rng = rng
         self._progress = progress
 

@@ -21,7 +21,7 @@ class DrivePolicy:
 
     name: str
     drives: Sequence[OptimisedDrive]
-    """One for each row."""
+    """Drives, one for each row."""
     knows: Knowledge = Knowledge.CLOCK
     """FUTURE where the drives were optimised for the very scenarios that they run in."""
     _follower: Follower = field(init=False)
@@ -36,7 +36,7 @@ class DrivePolicy:
 
 
 class Follower:
-    """Brings drums onto their drives and keeps them there, without a look at any instrument.
+    """Open-loop tracking: brings drums onto their drives and keeps them there, without any measurement.
 
     It reckons where its own commands have brought the drum, as the winch ramps at its limit of acceleration. A drive
     that starts under way is caught up with first, since the drum starts at rest.

@@ -1,4 +1,4 @@
-"""The source's four drives, S-Ω1, S-Ω2, H-Ω1 and H-Ω2: families of drives, each tuned for an objective."""
+"""The paper's four drives, S-Ω1, S-Ω2, H-Ω1 and H-Ω2: families of drives, each tuned for an objective."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TUNED: Final[dict[str, Tuned]] = {
     "H-Ω1": Tuned("harmonic", "omega1"),
     "H-Ω2": Tuned("harmonic", "omega2"),
 }
-"""By the source's names."""
+"""Tuned families, by the paper's names."""
 
 
 def optimised(

@@ -1,1 +1,1 @@
-"""Learned agents: what their networks see and do, and how they are stored."""
+"""Learned agents: features, networks, and their files."""

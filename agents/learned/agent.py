@@ -33,7 +33,7 @@ _BLOCK = 64
 
 @dataclass(frozen=True, kw_only=True)
 class AgentCard:
-    """What must be known of an agent to use it, and to know where it came from."""
+    """Description of an agent: how to use it, and where it came from."""
 
     algorithm: str
     observation: str
@@ -48,9 +48,9 @@ class AgentCard:
     timesteps: int
     versions: dict[str, str]
     sha256: str
-    """Of the file of weights."""
+    """sha256 of the file of weights."""
     squashed: bool = False
-    """Whether the action passes through tanh instead of being clipped."""
+    """True if the action passes through tanh instead of being clipped."""
     format: int = FORMAT
 
 

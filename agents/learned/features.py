@@ -1,4 +1,4 @@
-"""What agents see and do: from observations to the inputs of a network, and from its output to a drum speed.
+"""Features of the learned agents: from observations to a network's inputs, and from its output to a drum speed.
 
 The inputs are numbers of order one, each a fixed function of the observation and, for sensors, of a short memory of
 the readings, so that an agent needs no running statistics and means the same on every crane and in every sea. The
@@ -27,7 +27,7 @@ Float32Array = npt.NDArray[np.float32]
 LIMIT = 20.0
 """Features are clipped to ± this."""
 AUTHORITY = 0.25
-"""An output of 1 moves the rope's end by what the winch's greatest acceleration makes of so many seconds."""
+"""Speed of the rope's end for an output of 1 over the winch's greatest acceleration, s."""
 _DAMPING_RATIO = 0.03  # of the load's bobbing on the rope, share of critical
 
 STATE_FEATURES = (
@@ -68,7 +68,7 @@ class StateFeatures:
     def __init__(self, rows: int, control_period: float) -> None:
         self._hoists = HoistBatch(rows, control_period, STATE)
         self._rise = np.zeros(rows)
-        """Of the pulley during the coming control step, (N,) m."""
+        """Rise of the pulley during the coming control step, (N,) m."""
 
     def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
         """Features (n, F) of the first observations (n, K) of these ``rows``, hoists with these ``cranes`` (n)."""
@@ -92,7 +92,7 @@ class StateFeatures:
 
 
 class SensedFeatures:
-    """Features of N rows that have sensors: what the readings, and the commands since, tell of the present."""
+    """Features of N rows that have sensors: estimates of the present from the readings and the commands since."""
 
     names = SENSED_FEATURES
 
@@ -101,11 +101,11 @@ class SensedFeatures:
         self._observer = KalmanObserver(self._hoists, _DAMPING_RATIO, sensors)
         self._pulley = FadingPolynomial(rows, HEAVE_MEMORY, control_period)
         self._ahead = control_period * round(sensors.delay / control_period) + 0.5 * control_period
-        """From the moment that the readings speak of to the middle of the coming control step, s."""
+        """Time from the moment of measurement to the middle of the coming control step, s."""
         self._turned = np.zeros(rows)
-        """How far the drums turn in this control step, rad."""
+        """Turn of the drums in this control step, rad."""
         self._rise = np.zeros(rows)
-        """Of the pulley during the coming control step, (N,) m."""
+        """Rise of the pulley during the coming control step, (N,) m."""
 
     def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
         """Features (n, F) of the first observations (n, K) of these ``rows``, whose past is forgotten."""
@@ -136,7 +136,7 @@ class SensedFeatures:
             *_of_the_load(np, depth_error, load_velocity, rope_end - depth_error),
             10.0 * rope_end_speed,
             velocity[0],
-            self._pulley.rate(rows) + self._ahead * self._pulley.bend(rows),
+            self._pulley.rate(rows) + self._ahead * self._pulley.second_derivative(rows),
             soon,
             later,
             *_of_the_lift(o, hoists.frequency[rows]),
@@ -180,7 +180,7 @@ def coming_rise(o: Mapping[str, Any], period: float) -> Any:
 
 
 def wanted_turn(xp: Any, rise: Any, output: Any, radius: Any, max_acceleration: Any, period: float) -> Any:
-    """How far the drums are to turn, rad, while the pulleys ``rise`` m, for a network's ``output`` in [-1, 1]."""
+    """Turn of the drums, rad, while the pulleys ``rise`` m, for a network's ``output`` in [-1, 1]."""
     up = AUTHORITY * max_acceleration * radius * xp.clip(output, -1.0, 1.0)
     return (rise - period * up) / radius
 

@@ -1,4 +1,4 @@
-"""What agents see and do, as in ``features``, for tensors on any device: nothing goes to the processor and back."""
+"""Features of the learned agents, as in ``features``, for tensors on any device, without a way by the processor."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from aframe_env.task import STATE
 from agents.control.winch import WinchModel
 from agents.learned.features import LIMIT, STATE_FEATURES, coming_rise, of_the_state, wanted_turn
 
-_Find = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
+_Invert = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 """(wanted turns, drum speeds), both (N,) float64 → commands (N,)."""
 
 
@@ -25,13 +25,13 @@ class TensorStateFeatures:
         """``cuda``: whether the tensors are on a CUDA device, or in numba's simulator of one."""
         self._crane = crane
         self._period = control_period
-        self._find: _Find
+        self._invert: _Invert
         if cuda:
-            from agents.control.winch_cuda import find_commands
+            from agents.control.winch_cuda import invert_winches
 
-            self._find = partial(find_commands, crane.winch, control_period)
+            self._invert = partial(invert_winches, crane.winch, control_period)
         else:
-            self._find = _OnTheProcessor(crane, control_period)
+            self._invert = _OnTheProcessor(crane, control_period)
 
     def look(self, observation: torch.Tensor) -> torch.Tensor:
         """Features (N, F) float32 of observations (N, K) float32."""
@@ -53,7 +53,7 @@ class TensorStateFeatures:
         o, winch = _columns(observation), self._crane.winch
         rise = coming_rise(o, self._period)
         turn = wanted_turn(torch, rise, output[:, 0].double(), winch.drum_radius, winch.max_acceleration, self._period)
-        return self._find(turn, o["drum_speed"])[:, None].to(torch.float32)
+        return self._invert(turn, o["drum_speed"])[:, None].to(torch.float32)
 
 
 def _columns(observation: torch.Tensor) -> dict[str, torch.Tensor]:

@@ -61,7 +61,7 @@ def compiler() -> str:
 
 
 def compiler_version() -> str:
-    """First line of what the compiler says of itself."""
+    """First line of the compiler's version."""
     return _run([compiler(), "--version"]).splitlines()[0]
 
 
@@ -114,7 +114,7 @@ class Limit:
         return self._slots(name).transpose(0, 2, 1).reshape(self.rows, -1).copy()
 
     def write(self, name: str, values: npt.ArrayLike) -> None:
-        """Set a quantity of all rows from what broadcasts to (rows, size)."""
+        """Set a quantity of all rows from values that broadcast to (rows, size)."""
         rows = np.broadcast_to(values, (self.rows, _SIZES[name]))
         self._slots(name)[...] = rows.reshape(len(self._blocks), self.lanes, -1).transpose(0, 2, 1)
 
@@ -122,7 +122,7 @@ class Limit:
         return self._blocks[:, _FIRST[name] : _FIRST[name] + _SIZES[name]]
 
     def step(self, commands: npt.NDArray[Any]) -> None:
-        """One control step with the drum speed commands (rows,) rad/s, of the limit's own dtype."""
+        """Make one control step with the drum speed commands (rows,) rad/s, of the limit's own dtype."""
         assert commands.dtype == self._blocks.dtype
         assert commands.shape == (self.rows,)
         blocks, *rest = self._rest

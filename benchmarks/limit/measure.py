@@ -23,12 +23,12 @@ SUBSTEPS: Final = 10
 EPISODE: Final = 600
 """Control steps."""
 TOLERANCE: Final = 1e-5
-"""Most that the load may differ from the package's over an episode, m: the package's own error of the pulley's
-path between its knots is of this order, the rest is rounding."""
+"""Greatest difference allowed of the load's place from the package's over an episode, m: the package's own
+error of the pulley's path between its knots is of this order, the rest is rounding."""
 
 
 def set_up(limit: Limit, scenario: Scenario) -> None:
-    """Give all rows the parameters of a scenario, the load hanging right below the pulley of a ship at rest."""
+    """Set the parameters of a scenario in all rows, the load hanging right below the pulley of a ship at rest."""
     crane = scenario.crane
     values = {
         "mass": scenario.load_mass,
@@ -116,13 +116,13 @@ def trajectories(dtype: type = np.float64, rows: int = 64) -> tuple[FloatArray, 
 
 
 def deviation() -> Measurement:
-    """Most that the load's position differs from the package's over an episode, m."""
+    """Greatest difference of the load's place from the package's over an episode, m."""
     theirs, ours = trajectories()
     return lambda: float(np.abs(theirs - ours).max())
 
 
 def steps(dtype: type) -> Measurement:
-    """Each row's pulley goes round one and the same closed quintic in every control step."""
+    """Time control steps in which each row's pulley goes round one and the same closed quintic."""
     scenario = compared_scenario()
     limit = Limit(ROWS, SUBSTEPS, PERIOD, dtype, threads=cores())
     set_up(limit, scenario)

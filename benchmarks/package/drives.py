@@ -31,14 +31,14 @@ LANES: Final = 64
 
 @cache
 def objective() -> Objective:
-    """As the optimisers coarsely evaluate it."""
+    """Objective with the coarse step of the optimisers."""
     scenario = paper_case()
     return Objective(scenario, DURATION, coarse_step(scenario))
 
 
 @cache
 def finest() -> Objective:
-    """For the exact Ω1."""
+    """Objective with a fine step, for the exact Ω1."""
     return Objective(paper_case(), DURATION, FINE)
 
 
@@ -67,7 +67,7 @@ def filled() -> Measurement:
     none = np.zeros((len(angle), LANES))
 
     def together() -> FloatArray:
-        errors = objective().errors_beside(angle, rate, none, none)
+        errors = objective().perturbed_errors(angle, rate, none, none)
         return np.trapezoid(errors**2, dx=objective().step, axis=0)
 
     return microseconds(together, LANES)

@@ -45,7 +45,7 @@ def probe(make: str, cache: str) -> list[float]:
 
 
 def cold(make: str, caches: Caches) -> Measurement:
-    """With nothing compiled yet; what it compiles stays for the warm starts."""
+    """Measure a start with nothing compiled yet; the cache that it fills stays for the warm starts."""
 
     def measure() -> float:
         caches[make] = tempfile.TemporaryDirectory()
@@ -55,7 +55,7 @@ def cold(make: str, caches: Caches) -> Measurement:
 
 
 def warm(make: str, caches: Caches, column: int) -> Measurement:
-    """From the cache of the cold start before it."""
+    """Measure a start from the cache of the cold start before it."""
     if make not in caches:
         cold(make, caches)()
 

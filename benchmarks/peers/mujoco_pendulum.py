@@ -23,7 +23,7 @@ def scalar() -> Measurement:
 
 
 def rollout() -> Measurement:
-    """One env step is as many inner steps as InvertedPendulum-v5 makes of it."""
+    """Measure env steps of ``mujoco.rollout``, each of as many inner steps as InvertedPendulum-v5's."""
     import gymnasium
     import mujoco
     import numpy as np

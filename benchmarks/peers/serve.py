@@ -1,4 +1,4 @@
-"""How a measuring script answers: it stays warm, and measures whenever it is asked for one of its measurements.
+"""Server of a measuring script: it stays warm, and measures whenever it is asked for one of its measurements.
 
 The standard library alone, so that every environment can run it. By hand, ``python SCRIPT.py [NAME ...]`` measures
 three times and prints.
@@ -42,7 +42,7 @@ def speed(call: Callable[[], Any], work: int, seconds: float = SECONDS) -> Measu
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

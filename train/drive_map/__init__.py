@@ -1,1 +1,1 @@
-"""What the drive map is held against, and how that is written."""
+"""Checks of the drive map, and their report."""

@@ -1,7 +1,7 @@
-"""Build the map of basic drives and say what it is worth: ``python -m train.drive_map``.
+"""Build the map of basic drives and assess it: ``python -m train.drive_map``.
 
 Optimises a pseudo-harmonic drive at every node of heave amplitude × period × load mass × rope length, over worker
-processes; what is finished is kept, so that an interrupted build goes on where it was. Then holds the approximation
+processes; finished drives are kept, so that an interrupted build goes on where it was. Then holds the approximation
 against fresh optimisations between the nodes, and runs the map's drives in regular waves, swell and random seas.
 Writes the map (drive_map.safetensors, drive_map.json), held_out.json, a comparison for each kind of sea, drive_map.png
 and notes.md.
@@ -45,7 +45,7 @@ from train.shared.scenarios import ScenarioOptions
 
 @dataclass(frozen=True, kw_only=True)
 class Options(RunOptions, ScenarioOptions):
-    """The map's grid, and how it is tested."""
+    """The map's grid, and its tests."""
 
     amplitudes: tuple[float, ...] = (0.25, 0.5, 1.0, 2.0, 4.0)
     """Heave amplitudes of the crane's tip, m."""
@@ -62,11 +62,11 @@ class Options(RunOptions, ScenarioOptions):
     """How many held-out scenarios of each kind of sea; or a TOML file with a scenario or a distribution of your own,
     whose crane the map is then made for."""
     seed: int = 0
-    """Draws the heaves between the nodes."""
+    """Seed of the heaves between the nodes."""
     workers: int | None = None
     """Worker processes; by default one for each core."""
     store: Path = Path("runs/drive-map.sqlite")
-    """Keeps what is finished."""
+    """File that keeps finished optimisations."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

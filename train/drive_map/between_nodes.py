@@ -41,7 +41,7 @@ class HeldOut:
 
     @property
     def plain(self) -> dict[str, Any]:
-        """As plain data, the crane left out."""
+        """Return it as plain data, the crane left out."""
         data = asdict(self)
         del data["node"]["crane"]
         return data

@@ -19,7 +19,7 @@ from train.shared.run_folder import write_atomically
 
 
 def draw(path: Path, drive_map: DriveMap, crane: Crane, held_out: Sequence[HeldOut], seas: Sequence[InSea]) -> None:
-    """The map against the closed form, the approximation's error, and the reduction in each kind of sea."""
+    """Draw the map against the closed form, the approximation's error, and the reduction in each kind of sea."""
     figure = Figure(figsize=(12.0, 7.6), layout="constrained")
     ratio, lead, error, reduction = figure.subplot_mosaic([["r", "l", "e"], ["s", "s", "s"]]).values()
     tonnes = drive_map.mass / 1e3

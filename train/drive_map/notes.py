@@ -1,4 +1,4 @@
-"""notes.md of a drive map: what it holds, what it is worth, and what it is not."""
+"""notes.md of a drive map: its contents, its performance and its limits."""
 
 from __future__ import annotations
 

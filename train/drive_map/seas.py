@@ -38,7 +38,7 @@ def kinds_of(source: ScenarioSource) -> dict[str, ScenarioSource]:
 
 @dataclass(frozen=True)
 class InSea:
-    """What the policies do in one kind of sea."""
+    """Results of the policies in one kind of sea."""
 
     kind: str
     entries: Sequence[Entry]

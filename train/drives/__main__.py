@@ -1,7 +1,7 @@
 """Optimise drum drives for one scenario, as in the paper's section 4: ``python -m train.drives --case paper``.
 
 Writes summary.json and summary.csv (figures of merit), drives.json (decision variables), histories.csv, pictures, and
-notes.md (what was assumed, and where it differs from the paper) into the output folder.
+notes.md (assumptions, and differences from the paper) into the output folder.
 """
 
 from __future__ import annotations

@@ -9,8 +9,10 @@ from typing import Literal
 
 from rich.progress import Progress
 
+from aframe_env.rfem.simulate import Drum, DynamicCase, PrescribedDrum, StillDrum, simulate
 from aframe_env.scenario import Initial, Scenario
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
+from agents.drives.functions import Drive
 from agents.drives.objectives import FINE_STEP, Objective, coarse_step
 from agents.drives.optimisation import (
     FAMILIES,
@@ -23,11 +25,15 @@ from agents.drives.optimisation import (
     required_angle,
 )
 from agents.drives.optimisation import Progress as SearchProgress
-from train.drives.full_model import transfer
+from agents.policy import FloatArray
 from train.drives.notes import Variant
-from train.drives.results import Experiment, Result, SummaryRow
+from train.drives.results import Experiment, Result, SummaryRow, Transfer
 from train.shared.run_folder import RunOptions
 
+STEP = 2.5e-3
+"""Step of the full model, s."""
+OUTPUT_INTERVAL = 0.01
+"""Output interval of the full model, s."""
 PAPER_DAMPING_RATIO = 0.03
 """Damping of the load's bobbing on the rope in ``--case paper``, share of critical: the middle of the range that
 scenarios are drawn from. The paper states no figure."""
@@ -42,7 +48,7 @@ VARIANTS: tuple[tuple[Initial, float], ...] = (
 
 @dataclass(frozen=True, kw_only=True)
 class Options(RunOptions):
-    """What to optimise, and for which scenario."""
+    """Drives to optimise, and the scenario."""
 
     case: Literal["paper"] | None = None
     """A case by name; "paper" (the default when there is no --scenario) is the paper's section 4."""
@@ -51,19 +57,19 @@ class Options(RunOptions):
     drive: Literal["spline", "harmonic", "both"] = "both"
     """Family of drives."""
     objective: Literal["omega1", "omega2", "both"] = "both"
-    """What is made least: omega1 = ∫(x−h)² dt, omega2 = max|x−h|."""
+    """Objective to minimise: omega1 = ∫(x−h)² dt, omega2 = max|x−h|."""
     optimiser: Optimiser = "nelder-mead"
-    """What finds the least Ω1: the paper's Nelder-Mead, or Gauss-Newton. Ω2 is Nelder-Mead's in either case."""
+    """Optimiser for Ω1: the paper's Nelder-Mead, or Gauss-Newton. Ω2 is Nelder-Mead's in either case."""
     duration: float = 36.0
-    """How long the drive runs, s."""
+    """Duration t_k of the drive, s."""
     intervals: int = 18
     """Intervals of the spline."""
     harmonics: int = 1
     """Harmonics of the pseudo-harmonic drive."""
     max_evaluations: int = 20_000
-    """Most evaluations of the objective for each drive."""
+    """Greatest number of evaluations of the objective for each drive."""
     seed: int = 0
-    """Turns the simplexes of the restarts."""
+    """Seed of the restarts' simplexes."""
     check: Literal["rfem"] | None = None
     """Model to run the drives in once more: "rfem" is the full one, with the frame flexible."""
 
@@ -100,7 +106,7 @@ def paper_case(initial: Initial = "rest", damping_ratio: float = PAPER_DAMPING_R
 def solve(scenario: Scenario, options: Options, follow: Callable[[str], SearchProgress | None]) -> Experiment:
     """Leave the drum still, and find every drive asked for.
 
-    ``follow`` is called with a drive's label and returns what its search reports its progress to.
+    ``follow`` is called with a drive's label and returns the callback for its search's progress.
     """
     objective = Objective(scenario, options.duration, min(FINE_STEP, coarse_step(scenario)))
     times, error = objective.trajectory()
@@ -145,8 +151,28 @@ def checked(scenario: Scenario, duration: float, experiment: Experiment, bars: P
     return replace(experiment, results=tuple(results))
 
 
+def transfer(scenario: Scenario, duration: float, result: Result) -> Transfer:
+    """Run a drive, or the drum still, in the full model for ``duration`` s; the drum follows the drive exactly."""
+    case = DynamicCase(
+        scenario=scenario,
+        drum=StillDrum() if result.drive is None else _prescribed(result.drive),
+        duration=duration,
+        step=STEP,
+        output_interval=OUTPUT_INTERVAL,
+    )
+    run = simulate(case)
+    return Transfer(run.time, run.load[:, 2] - scenario.target_level)
+
+
+def _prescribed(drive: Drive) -> Drum:
+    def at(function: Callable[[float], FloatArray]) -> Callable[[float], float]:
+        return lambda time: float(function(min(time, drive.duration)))
+
+    return PrescribedDrum(angle=at(drive.angle), rate=at(drive.speed))
+
+
 def variants(options: Options, bars: Progress) -> list[Variant]:
-    """The paper's case with other starts and rope dampings, which the paper does not state."""
+    """Solve the paper's case with other starts and rope dampings, which the paper does not state."""
     found = []
     bar = bars.add_task("other starts and dampings", total=len(VARIANTS), unit="variants")
     for initial, ratio in VARIANTS:

@@ -1,4 +1,4 @@
-"""Pictures of an experiment with drives, of the kinds of the source's figures 14-18."""
+"""Pictures of an experiment with drives, of the kinds of the paper's figures 14-18."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def draw(folder: Path, target: float, radius: float, experiment: Experiment) -> 
 
 
 def _still(path: Path, target: float, times: FloatArray, still: Result) -> None:
-    """Kind of figure 14: the load's vertical coordinate with the drum still."""
+    """Draw the load's vertical coordinate with the drum still, as in figure 14."""
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     axes = figure.add_subplot()
     axes.axhline(target, color="black", lw=0.8, ls=":")
@@ -49,7 +49,7 @@ def _still(path: Path, target: float, times: FloatArray, still: Result) -> None:
 
 
 def _drives(path: Path, experiment: Experiment, drives: Sequence[Result], radius: float) -> None:
-    """Kind of figures 15 and 16: the drives themselves, and how they differ."""
+    """Draw the drives and their differences, as in figures 15 and 16."""
     times = experiment.times
     figure = Figure(figsize=(8.0, 7.2), layout="constrained")
     angle, speed, apart = figure.subplots(3, 1, sharex=True)
@@ -73,7 +73,7 @@ def _drives(path: Path, experiment: Experiment, drives: Sequence[Result], radius
 
 
 def _load(path: Path, family: str, times: FloatArray, drives: Sequence[Result]) -> None:
-    """Kind of figures 16 to 18: what is left of the load's motion under one family of drives."""
+    """Draw the load's residual motion under one family of drives, as in figures 16 to 18."""
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     axes = figure.add_subplot()
     for result in drives:
@@ -91,7 +91,7 @@ def _load(path: Path, family: str, times: FloatArray, drives: Sequence[Result]) 
 
 
 def _transfers(path: Path, experiment: Experiment) -> None:
-    """Kinds of figures 14 and 16 to 18: the simplified model's load beside the full one's."""
+    """Draw the simplified model's load beside the full one's, as in figures 14 and 16 to 18."""
     results = experiment.results
     figure = Figure(figsize=(8.0, 2.0 * len(results)), layout="constrained")
     for axes, result in zip(figure.subplots(len(results), 1, sharex=True), results, strict=True):
@@ -111,7 +111,7 @@ def _transfers(path: Path, experiment: Experiment) -> None:
 
 
 def _amplitudes(path: Path, results: Sequence[Result]) -> None:
-    """All amplitudes and root mean squares beside each other, on a logarithmic axis."""
+    """Draw all amplitudes and root mean squares beside each other, on a logarithmic axis."""
     figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     axes = figure.add_subplot()
     place = np.arange(len(results))

@@ -1,4 +1,4 @@
-"""notes.md: the table, what was assumed, and where the experiment differs from the source's and why."""
+"""notes.md: the table, the assumptions, and the differences from the paper's experiment with their reasons."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from train.shared.markdown import table
 
 @dataclass(frozen=True)
 class Variant:
-    """The paper's case with another start or rope damping, which the source does not state."""
+    """The paper's case with another start or rope damping, which the paper does not state."""
 
     initial: str
     damping_ratio: float
@@ -21,19 +21,19 @@ class Variant:
 
 
 PAPER = """\
-## Where this differs from the source, and why
-- The source's drawing of the crane has no figures left; the reference crane is a plausible 100 t A-frame of our own.
+## Where this differs from the paper, and why
+- The paper's drawing of the crane has no figures left; the reference crane is a plausible 100 t A-frame of our own.
   Amplitudes are therefore compared in order of magnitude: about 2 m and more with the drum still, near zero after
-  optimisation, and for Ω1 the harmonic drive several times better than the spline (the source: about 8 times).
+  optimisation, and for Ω1 the harmonic drive several times better than the spline (the paper: about 8 times).
 - Start and rope damping are not stated there. Here the load starts at rest under the rope that holds it at h, with
   {ratio:.0%} of critical damping; the table of variants below shows what else they could be. With an undamped rope
   the 18-interval spline excites the load's bobbing (2.4 s, near the 2 s between its knots), which never dies. A load
   that starts with the deck's velocity, 1.05 m/s, bobs by 0.4 m at once, and no drive of these families stops that.
 - The spline ends with no second derivative, the harmonic is a sum of sines of free amplitude, frequency and phase;
   the exact text of (33)-(36) is not available to us. Nelder-Mead (unless the command names another optimiser) starts
-  from the inverse of the geometry and is restarted until a round gains less than 0.2 %, where the source says only
+  from the inverse of the geometry and is restarted until a round gains less than 0.2 %, where the paper says only
   that it was used; Ω2 starts from the optimum of Ω1.
-- The simplified model (rigid frame) is optimised on; the drum follows the drive exactly, as in the source, from a
+- The simplified model (rigid frame) is optimised on; the drum follows the drive exactly, as in the paper, from a
   running start: dφ/dt at 0 is not zero.
 
 ## Variants of start and damping: amplitude, mm
@@ -41,7 +41,7 @@ PAPER = """\
 
 
 def _comparison(results: Sequence[Result]) -> str:
-    """The families against each other."""
+    """Compare the families."""
     amplitude = {r.row.label: r.row.amplitude for r in results}
     text = ""
     for index in "12":
@@ -52,7 +52,7 @@ def _comparison(results: Sequence[Result]) -> str:
 
 
 def _demands(results: Sequence[Result], times: FloatArray, winch: Winch) -> str:
-    """What the drives ask of the winch."""
+    """Table of the drives' demands on the winch."""
     r = winch.drum_radius
     rows = []
     for result in results:
@@ -67,7 +67,7 @@ def _demands(results: Sequence[Result], times: FloatArray, winch: Winch) -> str:
 
 
 def _transfers(results: Sequence[Result]) -> str:
-    """The same drives in the full model."""
+    """Table of the same drives in the full model."""
     rows = [
         (
             result.row.label,

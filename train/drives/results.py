@@ -1,4 +1,4 @@
-"""What an experiment with drives finds: figures of merit, demands on the winch, histories; and how they are written."""
+"""Results of an experiment with drives: figures of merit, demands on the winch, histories; and their files."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ class SummaryRow:
     amplitude: float
     """Greatest distance of the load from h, m."""
     evaluations: int
-    """Times that the objective was evaluated."""
+    """Number of evaluations of the objective."""
     seconds: float
     """Wall-clock time of the search."""
 
     @property
     def label(self) -> str:
-        """The source's name for it, as in S-Ω1."""
+        """The paper's name for it, as in S-Ω1."""
         return "drum still" if self.objective is None else f"{self.drive[0].upper()}-Ω{self.objective[-1]}"
 
     @property
@@ -58,7 +58,7 @@ class SummaryRow:
 
 @dataclass(frozen=True)
 class Transfer:
-    """What a drive does in the full model."""
+    """Result of a drive in the full model."""
 
     times: FloatArray
     """s."""
@@ -83,14 +83,14 @@ class Transfer:
 
 @dataclass(frozen=True)
 class Result:
-    """A row, its drive, and what the load does."""
+    """A row, its drive, and the load's motion."""
 
     row: SummaryRow
     drive: Drive | None
     error: FloatArray
     """x_L3 - h at the inner steps, m."""
     full: Transfer | None = None
-    """The same in the full model, if that was asked for."""
+    """Result in the full model, if that was asked for."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class Experiment:
     """The still drum and every drive asked for, on one scenario."""
 
     times: FloatArray
-    """Of the histories, s."""
+    """Times of the histories, s."""
     needed: FloatArray
     """Drum angle at ``times`` that would hold a load without inertia at h, rad."""
     results: tuple[Result, ...]
@@ -107,7 +107,7 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Demand:
-    """What a drive asks of the winch; the optimisation itself puts no limits on it."""
+    """Demand of a drive on the winch; the optimisation itself puts no limits on it."""
 
     speed: float
     """Greatest drum speed, rad/s."""
@@ -118,7 +118,7 @@ class Demand:
 
 
 def demand(drive: Drive, times: FloatArray) -> Demand:
-    """What ``drive`` asks of the winch, sampled at ``times`` (T,) s."""
+    """Demand of ``drive`` on the winch, sampled at ``times`` (T,) s."""
     speed = drive.speed(times)
     acceleration = np.gradient(speed, times)
     return Demand(float(np.abs(speed).max()), float(np.abs(acceleration).max()), float(speed[0]))

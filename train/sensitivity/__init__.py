@@ -1,1 +1,1 @@
-"""How policies take it when things are not what they were told."""
+"""Sensitivity of policies to wrong information."""

@@ -1,4 +1,4 @@
-"""How policies degrade when things are not what they were told: ``python -m train.sensitivity``.
+"""Study how policies degrade under wrong information: ``python -m train.sensitivity``.
 
 Load mass, rope length, E_R F_R, rope damping, period and phase of the waves, one at a time and all together. Writes
 sensitivity.json (curves and Sobol indices), one_at_a_time.png, sobol.png and notes.md into the output folder.

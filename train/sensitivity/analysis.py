@@ -1,4 +1,4 @@
-"""One-at-a-time curves and Sobol indices of what a policy leaves of the heave."""
+"""One-at-a-time curves and Sobol indices of the heave that a policy leaves."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ class Index:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What becomes of one policy."""
+    """Sensitivity of one policy."""
 
     policy: str
     knows: str
     curves: tuple[Curve, ...]
     indices: tuple[Index, ...]
-    """Of the mean over the assumed scenarios of the decimal logarithm of what is left."""
+    """Indices of the mean, over the assumed scenarios, of the decimal logarithm of the heave left."""
     median: float
-    """What is left over the whole ranges of all factors together, and in every assumed scenario: median,"""
+    """Heave left over the whole ranges of all factors together, and in every assumed scenario: median,"""
     high: float
     """95 % quantile,"""
     worst: float
@@ -76,7 +76,7 @@ def leftover(
 
 
 def curves(evaluate: Callable[[FloatArray], FloatArray], points: int) -> tuple[Curve, ...]:
-    """One factor at a time over ``points`` values of its range; ``evaluate`` is (N, factors) → (N, K)."""
+    """Vary one factor at a time over ``points`` values of its range; ``evaluate`` is (N, factors) → (N, K)."""
     grids = [np.linspace(factor.low, factor.high, points) for factor in FACTORS]
     values = np.tile(NOMINAL, (points * len(FACTORS), 1))
     for i, grid in enumerate(grids):
@@ -125,7 +125,7 @@ def analyse(
     samples: int,
     seed: int,
 ) -> Sensitivity:
-    """Everything about one policy."""
+    """Analyse one policy."""
 
     joint = np.empty((0, len(assumed)))
 

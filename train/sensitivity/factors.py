@@ -1,4 +1,4 @@
-"""What a policy may be told wrongly, and the scenario that is then the true one."""
+"""Quantities that a policy may be told wrongly, and the scenario that is then the true one."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Factor:
     low: float
     high: float
     assumed: float
-    """Where the truth is what was assumed."""
+    """Value at which the truth is as assumed."""
     label: str
 
 
@@ -53,7 +53,7 @@ class AlteredMotion:
 
 
 def altered(assumed: Scenario, values: Sequence[float]) -> Scenario:
-    """The true scenario, by the values of ``FACTORS``. The load starts at its target in it."""
+    """Return the true scenario, by the values of ``FACTORS``. The load starts at its target in it."""
     mass, length, stiffness, damping, period, phase = values
     if not has_components(assumed.motion):
         raise InvalidValue(f"motion = {assumed.motion}: must be a sum of components")

@@ -19,7 +19,7 @@ def _colour(number: int) -> str:
 
 
 def draw_curves(path: Path, studies: Sequence[Sensitivity]) -> None:
-    """One panel for each factor, one line for each policy: the median over the assumed scenarios."""
+    """Draw one panel for each factor, one line for each policy: the median over the assumed scenarios."""
     figure = Figure(figsize=(12.0, 7.4), layout="constrained")
     axes = figure.subplots(2, 3, sharey=True).ravel()
     for axis, factor in zip(axes, FACTORS, strict=True):
@@ -50,7 +50,7 @@ def draw_curves(path: Path, studies: Sequence[Sensitivity]) -> None:
 
 
 def draw_indices(path: Path, studies: Sequence[Sensitivity]) -> None:
-    """First-order (filled) and total (outlined) indices of each factor, policy by policy."""
+    """Draw first-order (filled) and total (outlined) indices of each factor, policy by policy."""
     figure = Figure(figsize=(12.0, 4.8), layout="constrained")
     axis = figure.subplots()
     width = 0.8 / len(studies)

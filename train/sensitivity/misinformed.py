@@ -17,8 +17,8 @@ OPEN_LOOP = (Knowledge.NOTHING, Knowledge.CLOCK, Knowledge.FUTURE)
 class Misinformed:
     """A policy over N rows of which each was told one of K assumed scenarios.
 
-    What it is told before the lift is the assumed scenario's, in the observation too (load mass and rope length); what
-    it measures is the truth.
+    Before the lift it is told the assumed scenario, in the observation too (load mass and rope length); its
+    measurements are true.
     """
 
     def __init__(self, policy: Policy, assumed: Sequence[Scenario], which: npt.NDArray[np.intp]) -> None:
@@ -31,7 +31,7 @@ class Misinformed:
 
     @property
     def _open_loop(self) -> bool:
-        """Looks at no instrument: rows that were told the same do the same."""
+        """True if the policy uses no measurement: rows that were told the same do the same."""
         return self.knows in OPEN_LOOP
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:

@@ -1,4 +1,4 @@
-"""One policy's share of a sensitivity study: what a worker process computes."""
+"""One policy's share of a sensitivity study, the job of a worker process."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ STILL, MAP = "drum still", "drive map"
 
 @dataclass(frozen=True, kw_only=True)
 class Options(RunOptions, ScenarioOptions):
-    """Which policies, in how many scenarios."""
+    """Policies and scenarios of the study."""
 
     policies: tuple[str, ...] = (
         STILL,
@@ -52,9 +52,9 @@ class Options(RunOptions, ScenarioOptions):
     drive_map: Path = Path("results/drive-map")
     """Folder of the drive map."""
     optimiser: Optimiser = "nelder-mead"
-    """What tunes the drives for Ω1."""
+    """Optimiser of the drives for Ω1."""
     seed: int = 0
-    """Draws the Sobol samples."""
+    """Seed of the Sobol samples."""
     workers: int | None = None
     """Worker processes; by default one for each core."""
 
@@ -105,7 +105,7 @@ def _policy(job: Job) -> Policy:
 
 
 def study(job: Job) -> Sensitivity:
-    """Everything about one policy."""
+    """Study one policy."""
     options = job.options
     assumed = assumed_scenarios(options)
     still = np.array(job.still)
@@ -113,7 +113,7 @@ def study(job: Job) -> Sensitivity:
 
 
 def assumed_scenarios(options: Options) -> list[Scenario]:
-    """What the policies are told."""
+    """Scenarios that the policies are told."""
     return held_out_scenarios(options.source, options.number)
 
 

@@ -51,11 +51,11 @@ CASE_KINDS: Mapping[str, Callable[[Mapping[str, Any], Path], dict[str, object]]]
     "release": lambda data, _: release_case(data),
     "dynamic": dynamic_case,
 }
-"""What runs a case, given what its file says and the file's folder."""
+"""Functions that run a case, given its file's contents and folder."""
 
 
 def run_all(*, say: bool = True) -> list[Check]:
-    """Every check, in the order of the table."""
+    """Run every check, in the order of the table."""
     checks: list[Check] = []
     for check in (
         frame_checks.beam_frequencies,
@@ -83,12 +83,12 @@ def run_all(*, say: bool = True) -> list[Check]:
 
 
 def versions() -> dict[str, str]:
-    """Of what the figures depend on."""
+    """Versions of the packages that the figures depend on."""
     return {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
 
 
 def write_report(checks: Sequence[Check], folder: Path) -> None:
-    """Table as Markdown and JSON, and the pictures."""
+    """Write the table as Markdown and JSON, and the pictures."""
     pictures = draw_all(folder)
     stated = ", ".join(f"{name} {version}" for name, version in versions().items())
     images = "\n\n".join(f"![{path.stem.replace('_', ' ')}]({path.name})" for path in pictures)
@@ -118,9 +118,9 @@ class Options:
     dynamic: Path | None = None
     """Run one case with ship motion, from a TOML file."""
     out: Path | None = None
-    """Where that case's result goes, a JSON file; by default it is printed."""
+    """JSON file for that case's result; by default it is printed."""
     folder: Path | None = None
-    """Where table and pictures of all checks go; by default runs/verify-DATE-TIME."""
+    """Folder for table and pictures of all checks; by default runs/verify-DATE-TIME."""
     overwrite: bool = False
     """Write even where there is something."""
 

@@ -146,7 +146,7 @@ def crane_of(data: Mapping[str, Any]) -> Crane:
 
 
 def model_of(data: Mapping[str, Any], crane: Crane, default: tuple[int, int]) -> FrameModel:
-    """The frame's model as finely divided as the file says."""
+    """Frame model with the file's division."""
     rfes = data.get("rfes", list(default))
     if not isinstance(rfes, list) or len(rfes) != 2:
         raise InvalidValue(f"rfes = {rfes!r}: must be two integers, [elements of a leg, elements of the beam]")
@@ -200,7 +200,7 @@ def columns_of(history: FrameHistory) -> dict[str, npt.NDArray[np.float64]]:
 
 
 def dynamic_columns(result: DynamicResult) -> dict[str, npt.NDArray[np.float64]]:
-    """Load, rope and :func:`columns_of` the frame."""
+    """Columns of load and rope, and :func:`columns_of` the frame."""
     columns = {f"xL{axis + 1}_m": result.load[:, axis] for axis in range(3)}
     columns |= {f"vL{axis + 1}": result.load_velocity[:, axis] for axis in range(3)}
     return columns | {"T_rope_N": result.tension} | columns_of(result.frame)
@@ -226,8 +226,8 @@ def dynamic_case(data: Mapping[str, Any], folder: Path = Path()) -> dict[str, ob
     """Run a dynamic case; time series with the column names of the reference data.
 
     Args:
-        data: What the file says.
-        folder: Where the files are that it names.
+        data: The file's contents.
+        folder: Folder of the files that it names.
     """
     keys = {item.name for item in fields(Scenario)}
     _only(data, _MODEL | _RUN | keys)

@@ -12,7 +12,7 @@ from aframe_env.rfem.beam import Array, Member
 from aframe_env.rfem.straight_beam import End
 
 _HELD = {"pinned": (0, 2), "clamped": (0, 1), "free": (2, 3)}
-"""Which of deflection, slope, moment, shear force are zero at an end."""
+"""Indices of those of deflection, slope, moment, shear force that are zero at an end."""
 
 
 def _determinant(member: Member, ends: tuple[End, End], omega: float, shear: bool) -> float:
@@ -42,8 +42,8 @@ def exact_frequencies(member: Member, ends: tuple[End, End], count: int, *, shea
 
     Args:
         member: A member of one section.
-        ends: How its ends are held.
-        count: How many.
+        ends: Supports of its ends.
+        count: Number of frequencies.
         shear: Timoshenko's beam (shear and rotary inertia); False: Euler–Bernoulli's.
     """
     section, material = member.section_at(0.0), member.material

@@ -107,7 +107,7 @@ def model(leg: int, beam: int, *, corrected_shear: bool = False, layout: Layout 
 
 
 def beam_frequencies() -> Check:
-    """Straight beam against Timoshenko's closed forms."""
+    """Check the straight beam against Timoshenko's closed forms."""
     member, rows, passed, slowest = straight_member(), [], True, math.inf
     for ends, table in BEAM_ERRORS.items():
         exact = exact_frequencies(member, ends, 3)
@@ -137,7 +137,7 @@ def beam_frequencies() -> Check:
 
 
 def determinate_reactions() -> Check:
-    """What equilibrium alone gives, at 5/2 and 20/16."""
+    """Check the statically determinate reactions at 5/2 and 20/16."""
     worst = 0.0
     for division in ((5, 2), (20, 16)):
         for name, case in CASES.items():
@@ -150,9 +150,6 @@ def determinate_reactions() -> Check:
         measured=f"{worst:.1e} (the reference has nine digits)",
         passed=worst <= 1e-6,
     )
-
-
-_VECTORS = ("u_S_D", "u_BR_D", "u_BL_D", "rot_S_D", "rot_BR_D", "rot_BL_D", "R_AR_D", "R_AL_D")
 
 
 def static_errors(frame: FrameModel, name: str) -> dict[str, float]:
@@ -170,7 +167,7 @@ def static_errors(frame: FrameModel, name: str) -> dict[str, float]:
 
 
 def static_frame() -> list[Check]:
-    """Deflections, rotations and moments at 20/16, their order, and the corrected stiffness at 5/2."""
+    """Check deflections, rotations and moments at 20/16, their order, and the corrected stiffness at 5/2."""
     checks = []
     for title, bar, limit, frame in (
         ("static frame at 20/16 rfes", "≤ 0.5 % of the finite-element figure", 5e-3, model(20, 16)),
@@ -231,7 +228,7 @@ def _static_order() -> Check:
 
 
 def natural_modes() -> Check:
-    """First ten natural frequencies."""
+    """Check the first ten natural frequencies."""
     reference = natural_frequencies()
     here: Array = frame_modes(Crane(), 10, model=model(20, 16)).frequency
     errors = here / reference - 1.0
@@ -249,7 +246,7 @@ def natural_modes() -> Check:
 
 
 def previous_model() -> Check:
-    """One chain against three beams: same results, fewer unknowns."""
+    """Check one chain against three beams: same results, fewer unknowns."""
     rows, gap, seconds = [], 0.0, {}
     layouts: tuple[Layout, ...] = ("one_chain", "three_beams")
     for division in ((10, 8), (20, 16)):

@@ -31,7 +31,7 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def _nodes(frame: FrameModel) -> tuple[Array, list[tuple[int, Array]]]:
-    """Places along the axis of the frame, in {D}, and what each moves with."""
+    """Places along the axis of the frame, in {D}, and the rfe that each moves with."""
     places, carriers = [], []
     for index, body in enumerate(frame.structure.bodies):
         for segment in body.segments:
@@ -62,7 +62,7 @@ def _views(axes: tuple[Axes, Axes], frame: FrameModel, position: Array, factor: 
 
 
 def deformed_frame() -> Figure:
-    """Load cases G, V, L1: undeformed and deformed frame from behind and from the side."""
+    """Draw load cases G, V, L1: undeformed and deformed frame from behind and from the side."""
     frame = model(20, 16)
     figure = Figure(figsize=(12, 9), layout="constrained")
     grid = figure.subplots(2, 3)
@@ -84,7 +84,7 @@ def deformed_frame() -> Figure:
 
 
 def moment_diagrams() -> Figure:
-    """Bending moments and normal force along the frame, 20/16 rfes, with the reference at N, B, S."""
+    """Draw bending moments and normal force along the frame, 20/16 rfes, with the reference at N, B, S."""
     frame = model(20, 16)
     figure = Figure(figsize=(12, 9), layout="constrained")
     grid = figure.subplots(3, 3, sharex=True)
@@ -112,7 +112,7 @@ def moment_diagrams() -> Figure:
 
 
 def mode_shapes() -> Figure:
-    """First eight mode shapes, 20/16 rfes."""
+    """Draw the first eight mode shapes, 20/16 rfes."""
     frame = model(20, 16)
     modes = frame_modes(Crane(), 8, model=frame)
     reference = natural_frequencies()
@@ -177,7 +177,7 @@ def _histories(
 
 
 def release_histories() -> Figure:
-    """Release over 0.1 s: deflection of S, servomotor force, reactions."""
+    """Draw a release over 0.1 s: deflection of S, servomotor force, reactions."""
     run = ramp_release()
     panels = [OUTBOARD, UPWARDS, SERVOMOTOR, *REACTIONS[1:]]
     names = ("rfem 120/100", "finite elements of 0.1 m")
@@ -188,19 +188,19 @@ _FLEXIBLE = ("rfem 20/16", "independent program")
 
 
 def figure_11() -> Figure:
-    """Deflection of S in the paper's case."""
+    """Draw the deflection of S in the paper's case."""
     here, there = dynamic_columns(paper_run()), time_series("paper_flexible")
     return _histories(here["t_s"], here, there, [OUTBOARD, UPWARDS], _FLEXIBLE)
 
 
 def figure_12() -> Figure:
-    """Servomotor force and leg reactions in the paper's case."""
+    """Draw servomotor force and leg reactions in the paper's case."""
     here, there = dynamic_columns(paper_run()), time_series("paper_flexible")
     return _histories(here["t_s"], here, there, [SERVOMOTOR, *REACTIONS], _FLEXIBLE)
 
 
 def figure_14() -> Figure:
-    """x_L3 in the full and the simplified model, and their difference."""
+    """Draw x_L3 in the full and the simplified model, and their difference."""
     here, there, rigid = (
         dynamic_columns(paper_run()),
         time_series("paper_flexible"),

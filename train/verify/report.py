@@ -1,4 +1,4 @@
-"""What a check found."""
+"""Results of the checks."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from train.shared.markdown import table
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One figure beside its reference."""
+    """A figure beside its reference."""
 
     quantity: str
     measured: str
@@ -20,7 +20,7 @@ class Row:
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """One check: the bar, what was measured, and whether it holds."""
+    """A check: the bar, the measured figures, and the verdict."""
 
     name: str
     bar: str
@@ -28,7 +28,7 @@ class Check:
     passed: bool
     rows: Sequence[Row] = field(default_factory=tuple)
     note: str = ""
-    """What a reader may ask about the rows."""
+    """Explanation of the rows."""
 
 
 def markdown(checks: Sequence[Check], heading: str, footer: str) -> str:

@@ -58,19 +58,19 @@ class Comparison:
 
 @cache
 def ramp_release(leg: int = 120, beam: int = 100) -> Comparison:
-    """Release of 100 t over 0.1 s, 2 s, undamped."""
+    """Simulate a release of 100 t over 0.1 s, 2 s, undamped."""
     history = release(Crane(), CASES["V"], ramp=0.1, step=1e-4, model=model(leg, beam))
     return Comparison(here=columns_of(history), there=time_series("release_ramp"))
 
 
 @cache
 def paper_run(step: float = 2.5e-3) -> DynamicResult:
-    """The paper's motion (42), drum still, at 20/16."""
+    """Simulate the paper's motion (42), drum still, at 20/16."""
     return simulate(DynamicCase(step=step), model=model(20, 16))
 
 
 def releases() -> Check:
-    """The ramped release at the reference's own mesh, and coarser for comparison."""
+    """Check the ramped release at the reference's own mesh, and coarser for comparison."""
     columns = ("uS1_m", "uS3_m", *REACTIONS)
     fine = ramp_release()
     worst = max(fine.error(column) for column in columns)
@@ -95,7 +95,7 @@ def releases() -> Check:
 
 
 def _sag(both: Comparison) -> str:
-    """Why the deflection of S differs by more than the load's place does."""
+    """Explain why the deflection of S differs by more than the load's place does."""
     names = ("uS1_m", "uS3_m")
     whole = " and ".join(f"{both.error(name):.2%}" for name in names)
     static = " and ".join(f"{abs(both.offset(name) / np.mean(both.there[name])):.2%}" for name in names)
@@ -109,7 +109,7 @@ def _sag(both: Comparison) -> str:
 
 
 def paper_case() -> list[Check]:
-    """Full against simplified model, and forces, as the independent program has them."""
+    """Check full against simplified model, and forces, as the independent program has them."""
     there, rigid = time_series("paper_flexible"), time_series("paper_rigid")
     both = Comparison(here=dynamic_columns(paper_run()), there=there)
     here_gap = both.here["xL3_m"] - rigid["xL3_m"]
@@ -154,7 +154,7 @@ def paper_case() -> list[Check]:
 
 
 def stiff_frame() -> Check:
-    """A frame 1000 × stiffer moves the load as a rigid one does."""
+    """Check that a frame 1000 × stiffer moves the load as a rigid one does."""
     frame = Crane().frame
     material = replace(
         frame.structure.material,
@@ -173,7 +173,7 @@ def stiff_frame() -> Check:
 
 
 def energy() -> Check:
-    """Work of the deck against what is stored and lost."""
+    """Check the deck's work against the energy stored and dissipated."""
     case = DynamicCase(step=2.5e-3, output_interval=2.5e-3)
     still = energy_balance(simulate(case)).error
     frame = Crane().frame
@@ -192,7 +192,7 @@ def energy() -> Check:
 
 
 def steps() -> Check:
-    """Halving the step."""
+    """Check the error of x_L3 as the step is halved."""
     runs = {h: simulate(DynamicCase(step=h)).load[:, 2] for h in (0.01, 0.005, 0.0025, 0.00125)}
     finest = runs[0.00125] + (runs[0.00125] - runs[0.0025]) / 3.0
     errors = {h: float(np.max(np.abs(run - finest))) for h, run in runs.items()}
@@ -233,7 +233,7 @@ def rough_sea(seed: int = 20090601) -> HarmonicMotion:
 
 
 def drift() -> Check:
-    """Feet and cylinders after ten minutes."""
+    """Check feet and cylinders after ten minutes."""
     scenario = Scenario.paper(motion=rough_sea(), rope_damping=2e4)
     case = DynamicCase(scenario=scenario, duration=600.0, step=0.02, output_interval=0.2)
     result = simulate(case, model=model(5, 2))
@@ -260,8 +260,8 @@ def drift() -> Check:
 
 
 def second_order_lengths(result: DynamicResult) -> dict[str, Array]:
-    """How much longer than in the linear frame the servomotors (C–N) and the legs' chords (A–N) are between the
-    displaced points, (k,), m, the larger of both sides."""
+    """Lengthening of the servomotors (C–N) and the legs' chords (A–N) between the displaced points, beyond that of
+    the linear frame, (k,), m, the larger of both sides."""
     frame, to_deck = result.frame.model.frame, result.frame.model.to_deck
     found: dict[str, list[Array]] = {"servomotors C–N": [], "legs' chords A–N": []}
     for side, y in (("R", -frame.half_width), ("L", frame.half_width)):

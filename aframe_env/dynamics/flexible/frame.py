@@ -34,7 +34,7 @@ def mode_of(frame: Array, mode: int, lanes: int) -> Array:
 
 @scalar
 def carry(frame: Array, table: Array, carried: int, lanes: int) -> None:
-    """Write CARRIED from the carried modes' displacement and rate as the step's end is foreseen."""
+    """Write CARRIED from the carried modes' displacement and rate as predicted for the step's end."""
     h = table[flex.STEP]
     for b in range(carried):
         mode = mode_of(frame, b, lanes)
@@ -47,7 +47,7 @@ def carry(frame: Array, table: Array, carried: int, lanes: int) -> None:
 
 @scalar
 def write_carried(frame: Array, products: Array, place: float, velocity: float, lanes: int, j: int) -> None:
-    """W_cd η + 2 Ω×_cd η̇ of one mode, into ``products`` (9 slots)."""
+    """Write W_cd η + 2 Ω×_cd η̇ of one mode into ``products`` (9 slots)."""
     x = 2.0 * velocity * frame[flex.SPIN * lanes + j]
     y = 2.0 * velocity * frame[(flex.SPIN + 1) * lanes + j]
     z = 2.0 * velocity * frame[(flex.SPIN + 2) * lanes + j]
@@ -82,7 +82,7 @@ def deck_force(frame: Array, uniform: tuple[float, ...], turning: tuple[float, .
 
 @scalar
 def load_mode(frame: Array, mode: Array, table: Array, i: int, modes: int, carried: int, lanes: int) -> None:
-    """RIGHT of mode i: weight and inertial terms, those of the carried modes' displacement and rate included."""
+    """Write RIGHT of mode i: weight and inertial terms, those of the carried modes' displacement and rate included."""
     c = flex.HEAD + flex.MODE_SIZE * i
     uniform, turning = three(table, c + flex.FIELD, 1, 0), nine(table, c + flex.FIELD + 3, 1, 0)
     for j in range(lanes):
@@ -98,7 +98,7 @@ def load_mode(frame: Array, mode: Array, table: Array, i: int, modes: int, carri
 
 @scalar
 def newmark_predict(frame: Array, table: Array, lanes: int) -> None:
-    """First pass: modes to the step's end without the rope's force there, and TIP.
+    """Take the modes to the step's end without the rope's force there, and write TIP: the first pass.
 
     POSITION and RATE become the end's share that is known already, ACCELERATION that without the rope's force. Lanes
     that are not ACTIVE stay as they are.
@@ -137,7 +137,7 @@ def newmark_predict(frame: Array, table: Array, lanes: int) -> None:
 
 @scalar
 def solve_coupled(frame: Array, table: Array, modes: int, carried: int, lanes: int) -> None:
-    """ACCELERATION and TIP where the damping couples the modes: the step's matrix A inverted beforehand.
+    """Write ACCELERATION and TIP where the damping couples the modes: the step's matrix A is inverted beforehand.
 
     With h L / 2 = A - 1 - β h² ω² the damping force of the known rate needs no product of its own.
     """
@@ -164,7 +164,7 @@ def solve_coupled(frame: Array, table: Array, modes: int, carried: int, lanes: i
 def add_to_tip(
     frame: Array, mode: Array, shape: tuple[float, float, float], late: float, half: float, lanes: int
 ) -> None:
-    """Add a mode's part to TIP: what S would do without the rope's force at the step's end."""
+    """Add a mode's part to TIP: the motion of S without the rope's force at the step's end."""
     s1, s2, s3 = shape
     for j in range(lanes):
         acceleration = mode[flex.ACCELERATION * lanes + j]
@@ -180,7 +180,7 @@ def add_to_tip(
 
 @scalar
 def newmark_correct(frame: Array, table: Array, lanes: int) -> None:
-    """Second pass: the rope's force PULL at the step's end added, and the modes brought there."""
+    """Add the rope's force PULL at the step's end and bring the modes there: the second pass."""
     half = 0.5 * table[flex.STEP]
     for i in range(int(table[flex.COUNT])):
         c = flex.HEAD + flex.MODE_SIZE * i

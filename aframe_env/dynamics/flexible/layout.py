@@ -1,4 +1,4 @@
-"""Where each quantity of the flexible frame lies: slots of a row, and places in the constants of a frame.
+"""Memory layout of the flexible frame: slots of a row, and places in the constants of a frame.
 
 Rows are stored as in ``aframe_env.dynamics.layout``, in an array of their own: (blocks, slots(modes) * lanes). The
 constants of a frame are one line of a table, (frames, size): the head, then MODE_SIZE numbers for each mode, then the
@@ -15,7 +15,7 @@ FRAME: Final = 0
 DRUM: Final = 1
 """Drum H in {D}, 3."""
 LOAD_ACCELERATION: Final = 4
-"""Of the load, base frame, 3."""
+"""Acceleration of the load in the base frame, 3."""
 PULL: Final = 7
 """Rope's force on the frame at S, along {D}, 3."""
 
@@ -29,7 +29,7 @@ ORIGIN: Final = 55
 SPIN: Final = 61
 """Angular velocity of {D}, along {D}, 3."""
 INPUT: Final = 64
-"""What the deck's motion does to the frame: field (gravity less acceleration, 3) and W = α× + Ω×Ω× (9), in {D}."""
+"""Deck's motion as the frame feels it: field (gravity less acceleration, 3) and W = α× + Ω×Ω× (9), in {D}."""
 CARRIED: Final = 76
 """W_cd η_b + 2 Ω×_cd η̇_b of the carried modes b: 9 for each of at most CARRIED_MOST."""
 CARRIED_MOST: Final = 8

@@ -1,4 +1,4 @@
-"""What a frame's present state means: deflection of S, reactions, servomotor forces, utilisation, largest rotation.
+"""Readout of a frame's present state: deflection of S, reactions, servomotor forces, utilisation, largest rotation.
 
 Reactions are R = Pᵀ(K q + L q̇ - f), linear in the modes and in what acts on the frame, see
 ``aframe_env.rfem.constraints``; the tables that say how come from ``aframe_env.rfem.tables``.
@@ -23,7 +23,7 @@ Array = npt.NDArray[np.float64]
 
 # Columns of a readout.
 DEFLECTION: Final = 0
-"""Of S, along {D}, 3, m."""
+"""Deflection of S along {D}, 3, m."""
 FEET: Final = 3
 """Forces on the frame at A_R and A_L, along {D}, 6, N."""
 SERVOMOTORS: Final = 9
@@ -53,7 +53,7 @@ def add_line(sums: Array, table: Array, first: int, size: int, factor: float) ->
 
 @scalar
 def read_frame(frame: Array, table: Array, stresses: Array, result: Array, lanes: int, j: int) -> None:
-    """Readout of lane j into ``result`` (READOUTS,); ``stresses`` (6 n_sde,) is scratch."""
+    """Write the readout of lane j into ``result`` (READOUTS,); ``stresses`` (6 n_sde,) is scratch."""
     modes, carried, springs = int(table[COUNT]), int(table[CARRIED_COUNT]), int(table[SPRINGS])
     points = int(table[POINTS])
     forces = result[:FORCES]

@@ -35,7 +35,7 @@ class Unloaded(NamedTuple):
 
 
 class Compliance(NamedTuple):
-    """What a unit force at the step's end adds there."""
+    """Displacements and rates that a unit force at the step's end adds there."""
 
     pulley: Matrix
     """Displacement of S, m/N."""
@@ -53,7 +53,7 @@ class PaidOut(NamedTuple):
     length: float
     """Unstretched, between drum and load, m."""
     speed: float
-    """Its rate, m/s."""
+    """Rate of that length, m/s."""
     axial_stiffness: float
     """E_R F_R, N."""
     damping: float

@@ -28,7 +28,7 @@ from aframe_env.dynamics.vector import Vector, add, cross, difference, scaled
 Array = npt.NDArray[np.float64]
 
 ITERATIONS: Final = 30
-"""Of the deflection of S, which turns the rope's second leg; each gains three digits or so."""
+"""Iterations of the deflection of S, which turns the rope's second leg; each gains three digits or so."""
 NOTHING: Final = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -95,7 +95,7 @@ def place_load(row: Array, frame: Array, deflection: Vector, comoving: float, la
 
 @scalar
 def release(row: Array, frame: Array, table: Array, deflection: Vector, lanes: int, j: int) -> None:
-    """Rope force at the start, and the accelerations of load and modes that follow from it."""
+    """Find the rope force at the start, and the accelerations of load and modes that follow from it."""
     pulley = add(three(row, at.PULLEY_ON_DECK, lanes, j), deflection)
     turned = nine(frame, flex.ROTATION, lanes, j)
     load, velocity = three(row, at.LOAD_POSITION, lanes, j), three(row, at.LOAD_VELOCITY, lanes, j)

@@ -1,4 +1,4 @@
-"""One control step of a block of rows of the full model: deck, winch, frame, rope, load."""
+"""Control step of a block of rows of the full model: deck, winch, frame, rope, load."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def add_cost(row: Array, z0: float, v0: float, z1: float, v1: float, h: float, l
 
 @scalar
 def mark_active(row: Array, frame: Array, line: float, index: int, lanes: int) -> bool:
-    """Mark the rows of the frame in that line of the tables that have an inner step ``index``; whether any has."""
+    """Mark the rows of that frame (line of the tables) that have an inner step ``index``; return whether any has."""
     found = 0.0
     for j in range(lanes):
         own = 1.0 if frame[flex.FRAME * lanes + j] == line else 0.0

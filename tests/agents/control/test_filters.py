@@ -16,7 +16,7 @@ def test_a_fading_polynomial_is_the_weighted_least_squares_parabola():
         polynomial.advance(np.array([value]))
     ages = -period * np.arange(len(signal))[::-1]
     weights = memory ** (np.arange(len(signal))[::-1] / 2)  # polyfit squares them
-    bend, rate, value = np.polyfit(ages[-100:], signal[-100:], 2, w=weights[-100:])
+    quadratic, rate, value = np.polyfit(ages[-100:], signal[-100:], 2, w=weights[-100:])
     assert polynomial.value(ALL)[0] == pytest.approx(value, rel=1e-6)
     assert polynomial.rate(ALL)[0] == pytest.approx(rate, rel=1e-6)
-    assert polynomial.bend(ALL)[0] == pytest.approx(2.0 * bend, rel=1e-6)
+    assert polynomial.second_derivative(ALL)[0] == pytest.approx(2.0 * quadratic, rel=1e-6)

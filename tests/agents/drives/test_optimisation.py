@@ -84,10 +84,10 @@ def test_neighbours_run_side_by_side_as_they_run_alone():
     objective = Objective(scenario, 20.0, coarse_step(scenario))
     angle, speed = spline_matrices(20.0, 8, objective.times)
     x = 0.3 * np.sin(np.arange(8.0))
-    beside = objective.errors_beside(angle @ x, speed @ x, angle, speed)
+    perturbed = objective.perturbed_errors(angle @ x, speed @ x, angle, speed)
     for j in range(8):
         alone = objective.errors(angle @ x + angle[:, j], speed @ x + speed[:, j])
-        np.testing.assert_allclose(beside[:, j], alone, atol=1e-9)
+        np.testing.assert_allclose(perturbed[:, j], alone, atol=1e-9)
 
 
 def test_figures_are_those_of_the_drive_itself(found):

@@ -38,7 +38,7 @@ def test_paper_case_writes_the_sources_experiment(tmp_path, monkeypatch):
     }  # fmt: skip
     for picture in out.glob("*.png"):
         assert picture.read_bytes().startswith(b"\x89PNG")
-    assert "differs from the source" in (out / "notes.md").read_text(encoding="utf-8")
+    assert "differs from the paper" in (out / "notes.md").read_text(encoding="utf-8")
     with (out / "summary.csv").open() as file:
         assert len(list(csv.DictReader(file))) == 5
     _histories_hold_what_the_summary_says(out, rows)
@@ -70,7 +70,7 @@ def test_any_scenario_from_a_file(tmp_path, monkeypatch):
     assert [row["drive"] for row in rows] == ["still", "harmonic"]
     assert rows[1]["rms"] < 0.01 * rows[0]["rms"]
     assert read_scenario(out / "scenario.toml") == read_scenario(path)
-    assert "differs from the source" not in (out / "notes.md").read_text(encoding="utf-8")
+    assert "differs from the paper" not in (out / "notes.md").read_text(encoding="utf-8")
 
 
 def test_drives_hold_the_load_in_the_full_model_too(tmp_path, monkeypatch):
