@@ -1,10 +1,10 @@
-"""What fixes a task: the arguments that every face of the environment takes."""
+"""The task's arguments, which every face of the environment takes."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -40,7 +40,7 @@ class TaskConfig:
     source: ScenarioSource = field(init=False, repr=False, compare=False)
     """``scenario``, read."""
     mesh: Mesh | None = field(init=False, repr=False, compare=False)
-    """Of the full model; None for the simplified one."""
+    """Mesh of the full model; None for the simplified one."""
 
     def __post_init__(self) -> None:
         require_choice("model", self.model, MODELS)
@@ -63,7 +63,7 @@ class TaskConfig:
 
     @property
     def sensors(self) -> Sensors | None:
-        """What measures the observation; None where the full state is observed."""
+        """Sensors that measure the observation; None where the full state is observed."""
         if isinstance(self.observation, Sensors):
             return self.observation
         if self.observation == "state":
@@ -72,15 +72,23 @@ class TaskConfig:
 
     @property
     def quantities(self) -> tuple[task.Quantity, ...]:
-        """What is observed."""
+        """Quantities of the observation."""
         return task.STATE if self.sensors is None else task.SENSED
 
-    def replaced(self, arguments: Mapping[str, Any]) -> TaskConfig:
+    def replaced(self, **arguments: Any) -> TaskConfig:
         """Return the same task but for these fields."""
-        unknown = sorted(set(arguments) - _FIELDS)
-        if unknown:
-            raise InvalidValue(f"unknown argument {unknown[0]!r}: must be one of {', '.join(sorted(_FIELDS))}")
-        return replace(self, **arguments)
+        return replace(self, **_known(arguments))
 
 
-_FIELDS: Final = frozenset(name for name, each in TaskConfig.__dataclass_fields__.items() if each.init)
+def task_config(config: TaskConfig | None, arguments: Mapping[str, Any]) -> TaskConfig:
+    """Return the task of a ``config``, or the default one, but for these fields."""
+    return TaskConfig(**_known(arguments)) if config is None else config.replaced(**arguments)
+
+
+def _known(arguments: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return them. Raises ``InvalidValue`` where one is no field of a task."""
+    known = sorted(each.name for each in fields(TaskConfig) if each.init)
+    for name in arguments:
+        if name not in known:
+            raise InvalidValue(f"unknown argument {name!r}: must be one of {', '.join(known)}")
+    return arguments

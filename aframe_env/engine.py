@@ -26,7 +26,7 @@ MAX_SEGMENT: Final = 0.2
 
 @dataclass(frozen=True)
 class Timing:
-    """How a control period is divided."""
+    """Division of a control period."""
 
     segments: int
     """Motion segments in a control period."""

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env import task
-from aframe_env.config import TaskConfig
+from aframe_env.config import TaskConfig, task_config
 from aframe_env.rendering import open_renderer
 from aframe_env.scenario import Scenario
 from aframe_env.simulation import RowState, Simulation
@@ -135,7 +135,7 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     def __init__(self, config: TaskConfig | None = None, *, render_mode: str | None = None, **arguments: Any) -> None:
         if render_mode is not None:
             require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
-        self._simulation = Simulation(1, (config or TaskConfig()).replaced(arguments))
+        self._simulation = Simulation(1, task_config(config, arguments))
         self.observation_space = self._simulation.observation_space  # type: ignore[assignment]
         self.action_space = self._simulation.action_space
         self.render_mode = render_mode

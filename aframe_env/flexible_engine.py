@@ -26,12 +26,12 @@ FLEXIBLE_STEP: Final = 0.0125
 ROPE_PHASE: Final = 0.25
 """Most that the load's bobbing on the rope turns in one inner step, rad; the scheme is stable up to some 2.4."""
 MOST_RFES: Final = 100
-"""Of a member: the modes of a finer frame take too long to find."""
+"""Most elements of a member: the modes of a finer frame take too long to find."""
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """How finely the frame is divided, and which of its modes are kept."""
+    """Division of the frame, and the number of modes that are kept."""
 
     division: Division
     modes: int | None = None

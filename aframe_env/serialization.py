@@ -1,7 +1,9 @@
-"""From plain data (TOML, JSON) to dataclasses and back: strict on types and keys, one clear error."""
+"""Plain data (TOML, JSON) and dataclasses: read, checked for types and keys, written; one clear error."""
 
 from __future__ import annotations
 
+import tomllib
+from pathlib import Path
 from typing import Any, TypeVar
 
 from cattrs import Converter, transform_error
@@ -10,6 +12,16 @@ from cattrs.errors import BaseValidationError, ForbiddenExtraKeysError
 from aframe_env.validation import InvalidValue
 
 T = TypeVar("T")
+
+
+def read_toml(path: Path, name: str) -> dict[str, Any]:
+    """Read a TOML file that the user calls ``name``. Raises ``InvalidValue``: no such file, or not TOML."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidValue(f"{name} = {str(path)!r}: cannot be read: {error}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InvalidValue(f"{path}: not TOML: {error}") from error
 
 
 def strict_converter() -> Converter:

@@ -33,7 +33,7 @@ class RowState:
     sensors: tuple[FloatArray, FloatArray, FloatArray, int, int] | None
     step: int
     mesh: Mesh | None = None
-    """Of the full model; None for the simplified one."""
+    """Mesh of the full model; None for the simplified one."""
 
 
 class Simulation:
@@ -154,7 +154,7 @@ class Simulation:
         self._report(self._engine.blocks, self.episode_duration, rows, self.state, self.results)
 
     def _known(self) -> FloatArray:
-        """What the operator knows before the lift: mass and nominal unstretched rope length, (rows, 2)."""
+        """Mass and nominal unstretched rope length, known to the operator before the lift, (rows, 2)."""
         mass = self._engine.read(at.MASS)
         return np.stack([mass, self._engine.read(at.FREE_LENGTH)], axis=1)
 

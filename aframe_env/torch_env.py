@@ -10,7 +10,7 @@ import torch
 from gymnasium.error import DependencyNotInstalled
 
 from aframe_env import task
-from aframe_env.config import TaskConfig
+from aframe_env.config import TaskConfig, task_config
 from aframe_env.dynamics.random import episode_uniforms
 from aframe_env.scenario import NUMBERS, Scenario
 from aframe_env.scenario.motion import require_coverage
@@ -87,7 +87,7 @@ class AFrameHeaveTorchEnv:
         require_integer("num_envs", num_envs, low=1, high=2**24)
         _require_tensordict()
         kind = _kind(device)
-        config = (config or TaskConfig()).replaced(arguments)
+        config = task_config(config, arguments)
         if config.model != "simplified" or config.sensors is not None:
             raise InvalidValue(
                 f"model = {config.model!r}, observation = {config.observation!r}: tensors have the full state of the "
@@ -99,9 +99,9 @@ class AFrameHeaveTorchEnv:
         self.cfg = TorchEnvConfig(num_envs, config, str(device), seed)
         self.num_envs = num_envs
         self.observation_space = simulation.observation_space
-        """Of one row."""
+        """Space of one row."""
         self.action_space = simulation.action_space
-        """Of one row, rad/s."""
+        """Space of one row, rad/s."""
         self.max_episode_length = simulation.episode_steps
         self._rows = _open_rows(simulation, num_envs, str(device))
         self.device = self._rows.device

@@ -14,7 +14,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from aframe_env import task
-from aframe_env.config import TaskConfig
+from aframe_env.config import TaskConfig, task_config
 from aframe_env.env import EnvState
 from aframe_env.rendering import open_renderer
 from aframe_env.scenario import Scenario
@@ -55,7 +55,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         require_integer("num_envs", num_envs, low=1, high=2**24)
         if render_mode is not None:
             require_choice("render_mode", render_mode, ("rgb_array",))
-        config = (config or TaskConfig()).replaced(arguments)
+        config = task_config(config, arguments)
         if max_episode_steps is not None:
             require_integer("max_episode_steps", max_episode_steps, low=1, high=2**31)
             config = replace(config, episode_duration=max_episode_steps * config.control_period)

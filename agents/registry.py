@@ -63,8 +63,8 @@ class BuildContext:
 
     @property
     def sensors(self) -> Sensors:
-        """What measures the task for policies on sensors."""
-        return self.config.replaced({"observation": "sensors"}).sensors or Sensors()
+        """Sensors of policies that act on them."""
+        return self.config.replaced(observation="sensors").sensors or Sensors()
 
 
 @dataclass(frozen=True)

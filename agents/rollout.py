@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env import task
-from aframe_env.config import TaskConfig
+from aframe_env.config import TaskConfig, task_config
 from aframe_env.dynamics import layout as at
 from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.simulation import Simulation
@@ -36,7 +36,7 @@ def held_out_scenarios(source: ScenarioSource, count: int) -> list[Scenario]:
 
 
 HISTORY = (task.DEPTH_ERROR, task.DRUM_SPEED, task.ROPE_TENSION)
-"""What is kept of every control step."""
+"""Columns of the state that are kept of every control step."""
 BAND = 0.05
 """Depth error that an operator can live with, m: time beyond it is counted."""
 
@@ -100,9 +100,9 @@ def run(
     ``noise_seed`` draws the sensors' noise, the same for every policy.
     """
     rows = len(scenarios)
-    config = (config or TaskConfig()).replaced(arguments)
+    config = task_config(config, arguments)
     # A single scenario stands for all of them: their cranes' winches are alike. It has no sensors of its own.
-    config = config.replaced({"observation": config.sensors or "state", "scenario": scenarios[0]})
+    config = config.replaced(observation=config.sensors or "state", scenario=scenarios[0])
     simulation = Simulation(rows, config)
     seeds = np.random.default_rng(noise_seed).integers(2**63, size=rows).tolist()
     simulation.reset_rows(np.arange(rows), list(zip(scenarios, seeds, strict=True)))

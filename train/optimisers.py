@@ -30,11 +30,11 @@ from train.shared.scenarios import ScenarioOptions
 
 @dataclass(frozen=True, kw_only=True)
 class Options(RunOptions, ScenarioOptions):
-    """How much to compare."""
+    """Size of the comparison."""
 
     bounds: ClassVar[tuple[int, int]] = (0, 10_000)
     scenarios: int | Path = 5
-    """How many held-out scenarios beside the paper's case; or a TOML file with a distribution of your own."""
+    """Number of held-out scenarios beside the paper's case; or a TOML file with a distribution of your own."""
     max_evaluations: int = 20_000
     """Most evaluations of the objective for each drive."""
     workers: int | None = None
@@ -58,7 +58,7 @@ class Search:
 
 @dataclass(frozen=True)
 class Found:
-    """What a search found."""
+    """Result of a search."""
 
     search: Search
     variables: int

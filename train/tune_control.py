@@ -52,16 +52,16 @@ TUNABLE: dict[Name, Tunable] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Options(RunOptions, ScenarioOptions):
-    """What to tune, on how much."""
+    """Policies to tune, and size of the search."""
 
     policies: tuple[Name, ...] = tuple(TUNABLE)
     """Policies to tune."""
     scenarios: int | Path = 200
-    """How many training scenarios; or a TOML file with a scenario or a distribution of your own."""
+    """Number of training scenarios; or a TOML file with a scenario or a distribution of your own."""
     evaluations: int = 40
     """Gains to try for each policy."""
     seed: int = 1
-    """Of the training scenarios; never that of the held-out ones."""
+    """Seed of the training scenarios; never that of the held-out ones."""
     out: Path | None = Path("runs/control")
     """Output folder."""
 

@@ -2,8 +2,9 @@
 
 The rope's law, the load's acceleration, and the Runge-Kutta step with the running Ω1 integral beside it. Whatever
 integrates this model (the engine, the drives' objective, the rows on a GPU) takes them from here, and a row's constants
-through :func:`load_constants`: a new force on the load is written here once. The compiled full model takes the rope's
-law from here; the stand-alone reference runs state it for themselves, in ``aframe_env.rfem.rope_law``.
+through :func:`load_constants`. The compiled full model takes the rope's law from here and moves the load by an implicit
+step of its own, in ``flexible.step``; the stand-alone reference runs state the law for themselves, in
+``aframe_env.rfem.rope_law``.
 """
 
 from __future__ import annotations

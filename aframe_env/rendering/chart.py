@@ -12,7 +12,7 @@ from aframe_env.rendering.history import SPAN
 from aframe_env.rendering.view import FloatArray, round_limit
 
 _MARGINS: Final = (52.0, 34.0, 18.0, 24.0)
-"""From the card's left, top, right and bottom edges to the curves, pixels."""
+"""Margins from the card's left, top, right and bottom edges to the curves, pixels."""
 
 
 def draw_chart(canvas: Canvas, box: Box, time: float, history: FloatArray) -> None:

@@ -14,7 +14,7 @@ from aframe_env.rendering.scene import Scene
 from aframe_env.rendering.ship import draw_wheel
 
 _SWEEP: Final = math.radians(125.0)
-"""From standstill, at the top of the dial, to the greatest speed."""
+"""Angle from standstill, at the top of the dial, to the greatest speed."""
 
 
 def draw_instruments(canvas: Canvas, box: Box, scene: Scene) -> None:

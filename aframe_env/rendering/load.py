@@ -16,7 +16,7 @@ MEMORY: Final = 10.0
 _RULER: Final = 46.0
 """Room for the ruler, pixels."""
 _MARGIN: Final = 26.0
-"""From the ruler's ends to the edges, pixels."""
+"""Margin from the ruler's ends to the edges, pixels."""
 
 
 def draw_load(canvas: Canvas, place: FloatArray, width: float) -> None:

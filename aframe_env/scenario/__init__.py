@@ -1,4 +1,4 @@
-"""What fixes an episode: crane, ship motion, sea, vessel, sensors, load; fixed, drawn, or read from a file."""
+"""Scenarios: crane, ship motion, sea, vessel, sensors and load of an episode; fixed, drawn, or read from a file."""
 
 from aframe_env.scenario.crane import GRAVITY, Crane, Frame, Rope, Winch
 from aframe_env.scenario.distribution import NUMBERS, Range, ScenarioDistribution, ScenarioSource

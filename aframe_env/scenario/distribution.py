@@ -46,7 +46,7 @@ def _draw(value: Range, uniform: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class ScenarioDistribution:
-    """What scenarios are drawn from: seas or recorded motions, load masses and rope lengths, exact or intervals.
+    """Distribution of scenarios: seas or recorded motions, load masses and rope lengths, exact or intervals.
 
     Sea, load and rope take their random numbers from sub-streams of their own: changing one leaves the others'
     draws alone.
@@ -77,11 +77,11 @@ class ScenarioDistribution:
     """Time over which the ship's motion builds up, s."""
     crane: Crane = field(default_factory=Crane)
     sensors: Sensors = field(default_factory=Sensors)
-    """What measures the observation "sensors"."""
+    """Sensors of the observation "sensors"."""
     records: tuple[RecordedMotion, ...] = ()
     """Recorded motions in place of the seas: each episode meets a stretch of one of them, from a random start."""
     window: float = 60.0
-    """With ``records``: length of a stretch, s; at least an episode's."""
+    """Length of a stretch of ``records``, s; at least an episode's."""
 
     def __post_init__(self) -> None:
         _require_range("hs", self.hs, "m", 0.0, 30.0)
@@ -185,4 +185,4 @@ class ScenarioDistribution:
 
 
 ScenarioSource = Scenario | ScenarioDistribution
-"""What an environment takes: one fixed scenario, or the distribution to draw from."""
+"""One fixed scenario, or the distribution to draw from: an environment takes either."""

@@ -23,7 +23,6 @@ Files that are named within are looked for beside the scenario file.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -50,7 +49,7 @@ from aframe_env.scenario.scenario import Scenario
 from aframe_env.scenario.sea import Sea, SeaMotion
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.scenario.vessel import Vessel
-from aframe_env.serialization import strict_converter, structure, without_none
+from aframe_env.serialization import read_toml, strict_converter, structure, without_none
 from aframe_env.validation import InvalidValue, require_choice
 
 _SECTIONS: Mapping[str, type[Section]] = {
@@ -76,13 +75,7 @@ def read_scenario(path: str | Path) -> Scenario:
 def read_scenarios(path: str | Path) -> ScenarioSource:
     """Read a scenario or a distribution. Raises ``InvalidValue`` that names the file and the key of what is wrong."""
     path = Path(path)
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidValue(f"scenario = {str(path)!r}: cannot be read: {error}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InvalidValue(f"{path}: not TOML: {error}") from error
-    return scenarios_of(data, path.parent, str(path))
+    return scenarios_of(read_toml(path, "scenario"), path.parent, str(path))
 
 
 def scenario_of(data: Mapping[str, Any], folder: Path, source: str) -> Scenario:

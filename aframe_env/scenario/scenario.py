@@ -28,7 +28,7 @@ class Scenario:
     rope_damping: float = 0.0
     """d_R, N s/m."""
     initial: Initial = "comoving"
-    """Whether the load starts with the pulley's velocity or at rest."""
+    """Start of the load: with the pulley's velocity ("comoving") or at rest."""
     ramp: float = 0.0
     """Time over which the ship's motion builds up from nothing, s (a quintic smoothstep); 0 for none."""
     gravity: float = GRAVITY

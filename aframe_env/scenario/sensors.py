@@ -47,7 +47,7 @@ class Sensors:
     """
 
     delay: float = 0.1
-    """From a motion to its reading, s; for all channels."""
+    """Time from a motion to its reading, s; for all channels."""
     heave: Channel = field(default_factory=lambda: Channel(noise=0.05, relative_noise=0.05, correlation_time=30.0))
     """Pulley's vertical displacement, m."""
     heave_rate: Channel = field(default_factory=lambda: Channel(noise=0.01, relative_noise=0.01))

@@ -59,7 +59,7 @@ class Options(RunOptions, ScenarioOptions):
     """Regular heaves between the nodes that the approximation is held against."""
     bounds: ClassVar[tuple[int, int]] = (2, 10**6)
     scenarios: int | Path = 60
-    """How many held-out scenarios of each kind of sea; or a TOML file with a scenario or a distribution of your own,
+    """Number of held-out scenarios of each kind of sea; or a TOML file with a scenario or a distribution of your own,
     whose crane the map is then made for."""
     seed: int = 0
     """Seed of the heaves between the nodes."""

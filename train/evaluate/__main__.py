@@ -25,7 +25,7 @@ REPORT_PACKAGES = ("jinja2", "plotly", "pyarrow")
 
 @dataclass(frozen=True, kw_only=True)
 class Options(RunOptions, HeldOut):
-    """Which policies, on what."""
+    """Policies, and the held-out scenarios that they meet."""
 
     policies: tuple[str, ...] = (
         "results/agents/ppo",

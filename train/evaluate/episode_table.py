@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Traits:
-    """What a scenario is, in figures; NaN for what a motion without a sea lacks."""
+    """A scenario in figures; NaN for what a motion without a sea lacks."""
 
     hs: float
     """m."""
@@ -72,7 +72,7 @@ UNITS: Final = {
     "peak_power": "W",
     "time_outside": "s",
 }
-"""Of the columns that have one; also in the Parquet file, as each field's metadata."""
+"""Units of the columns that have one; also in the Parquet file, as each field's metadata."""
 
 
 def table(comparison: Comparison) -> pyarrow.Table:

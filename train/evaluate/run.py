@@ -32,7 +32,7 @@ AFTER_TRAINING: Final = (
     "S-Ω1 for each scenario",
     "H-Ω1 for each scenario",
 )
-"""What an agent is compared with at the end of its training."""
+"""Policies that an agent is compared with at the end of its training."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,11 +44,11 @@ class HeldOut(ScenarioOptions):
     """The first so many of them, or all if there are fewer, for the drives that are optimised for each scenario, its
     whole future known."""
     observation: Literal["state", "sensors"] = "state"
-    """What a policy sees that is not made for either; an agent sees what it was trained on."""
+    """Observation of a policy that is made for neither; an agent sees what it was trained on."""
     model: Literal["simplified", "rfem"] = "simplified"
     """Model that the policies run on; drives are optimised on the simplified one."""
     rfem_modes: int | None = None
-    """With rfem, the number of natural modes to keep; all by default."""
+    """Number of natural modes to keep with rfem; all by default."""
     control_period: float = TaskConfig.control_period
     """Control step, s; an agent runs at the one that it was trained at."""
     episode_duration: float = TaskConfig.episode_duration
@@ -117,7 +117,7 @@ def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console) ->
             episodes = run(
                 policy,
                 mine,
-                config.replaced({"observation": _observation(policy, config)}),
+                config.replaced(observation=_observation(policy, config)),
                 progress=lambda step, bar=bar: progress.update(bar, completed=step),  # type: ignore[misc]
             )
             entries.append(Entry(spec.name, policy.knows, episodes))

@@ -1,4 +1,4 @@
-"""What a learner is to the commands that train and tune it."""
+"""A learner as the commands that train and tune it see it."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from train.learn.options import LearningOptions
 
 
 class Model(Protocol):
-    """What is needed of a learner of Stable-Baselines3, or of another that does the same."""
+    """Interface of a learner: that of Stable-Baselines3, as far as it is needed."""
 
     num_timesteps: int
 
     @property
     def logger(self) -> Logger:
-        """Where figures go."""
+        """Logger of the figures."""
         ...
 
     def set_logger(self, logger: Logger) -> None:
@@ -34,13 +34,13 @@ class Model(Protocol):
 
 
 class Rows(Protocol):
-    """What is needed of a learner's rows."""
+    """Interface of a learner's rows."""
 
     num_envs: int
 
     @property
     def quantities(self) -> tuple[task.Quantity, ...]:
-        """What an observation of the environment consists of."""
+        """Quantities of the environment's observation."""
         ...
 
     def reset(self) -> object:
@@ -64,7 +64,7 @@ class Learner:
 
 @dataclass(frozen=True)
 class Range:
-    """Where a hyper-parameter may lie."""
+    """Interval of a hyper-parameter."""
 
     low: float
     high: float
@@ -73,7 +73,7 @@ class Range:
 
 @dataclass(frozen=True)
 class Search:
-    """Which of a learner's options are searched by ``train.tune``, and where."""
+    """Search space of ``train.tune``: options of a learner, and their values."""
 
     ranges: dict[str, Range]
     choices: dict[str, tuple[int, ...]] = field(default_factory=dict)

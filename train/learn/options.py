@@ -26,7 +26,7 @@ class LearningOptions(RunOptions):
     seeds: int = 1
     """Train so many agents, with seeds one after another, each in a folder of its own."""
     observation: Literal["state", "sensors"] = "state"
-    """What the agent sees."""
+    """Observation of the agent."""
     scenarios: Path | None = None
     """A TOML file with a scenario or a distribution of your own to learn from; by default the package's seas."""
     control_period: float = TaskConfig.control_period
@@ -89,7 +89,7 @@ class LearningOptions(RunOptions):
 
     @property
     def held_out(self) -> HeldOut:
-        """What the agent is compared on: the same task, held-out scenarios."""
+        """Held-out scenarios of the same task, for the comparison at the end."""
         own = self.scenarios is not None
         return HeldOut(
             scenarios=self.scenarios or self.eval_scenarios,

@@ -39,7 +39,7 @@ class Options(ppo.Options):
     """Options of the training."""
 
     device: Literal["cpu", "cuda"] = "cuda"
-    """Where environment and learner run."""
+    """Device of environment and learner."""
     timesteps: int = 20_000_000
     """Control steps to learn from, over all rows."""
     n_envs: int = 4096
@@ -116,7 +116,7 @@ class RslPPO:
 
     @property
     def logger(self) -> Logger:
-        """Where figures go."""
+        """Logger of the figures."""
         assert self._logger is not None
         return self._logger
 
@@ -178,7 +178,7 @@ def build(options: Options) -> Learner:
     """The learner and its rows."""
     torch.manual_seed(options.seed)
     torch.set_num_threads(options.threads)
-    config = options.config.replaced({"episode_duration": options.horizon})
+    config = options.config.replaced(episode_duration=options.horizon)
     env = AFrameHeaveTorchEnv(options.n_envs, config, device=options.device, seed=options.seed)
     rows = TrainingRows(
         env,

@@ -1,4 +1,4 @@
-"""What every learner's command does around its own algorithm: run folder, progress, agent, comparison."""
+"""The run of a learner's command: folder, progress, agent, comparison."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class Options(LearningOptions):
     tau: float = 0.01
     """Share by which the target critics follow at each update."""
     target_entropy: float = -1.0
-    """Of an action, nat: -1 is a standard deviation of 0.09."""
+    """Entropy of an action to aim at, nat: -1 is a standard deviation of 0.09."""
     ent_coef: float = 0.01
     """Entropy's weight at the start."""
     n_steps: int = 1

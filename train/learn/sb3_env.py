@@ -79,7 +79,7 @@ class TrainingVecEnv(VecEnv):
         sensors = config.sensors
         self._features = features_for(rows, control_period, sensors)
         self.actor_inputs = len(self._features.names)
-        """Of the observation's features, so many are the agent's; the rest is for the critics."""
+        """Number of features that are the agent's; the rest is for the critics."""
         self._privileged = StateFeatures(rows, control_period) if sensors else None
         inputs = self.actor_inputs + (len(STATE_FEATURES) if self._privileged else 0)
         self._observations = np.zeros((rows, inputs), dtype=np.float32)
@@ -95,7 +95,7 @@ class TrainingVecEnv(VecEnv):
 
     @property
     def quantities(self) -> tuple[task.Quantity, ...]:
-        """What an observation of the environment consists of."""
+        """Quantities of the environment's observation."""
         return self._simulation.config.quantities
 
     def pop_reduction(self) -> float:

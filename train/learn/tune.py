@@ -20,43 +20,45 @@ from rich.console import Console
 from rich.progress import Progress
 
 from aframe_env.scenario import Scenario, ScenarioSource
-from aframe_env.validation import InvalidValue, require_integer
+from aframe_env.validation import InvalidValue, require_choice, require_integer
 from agents.policy import DrumStill
 from agents.rollout import HELD_OUT_SEED, drawn_scenarios, run
 from train.learn.learner import Search
-from train.learn.registry import find_learner
+from train.learn.registry import LEARNERS, find_learner
 from train.learn.run import to_policy
 from train.shared.cli import parse, to_toml
 from train.shared.markdown import table
 from train.shared.run_folder import command_line, user_errors, versions, write_json, write_text
 from train.shared.scenarios import ScenarioOptions
 
-Algorithm = Literal["ppo", "sac"]
 VALIDATION_SEED: Final = 7_000_001
-"""Of the scenarios that trials are judged by."""
+"""Seed of the scenarios that trials are judged by."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options(ScenarioOptions):
-    """What to search, on how much."""
+    """Learner, and size of the search."""
 
-    algorithm: Algorithm = "ppo"
-    """Learner."""
+    algorithm: str = "ppo"
+    """Learner, by its name in ``train.learn.registry``."""
     observation: Literal["state", "sensors"] = "state"
-    """What the agent sees."""
+    """Observation of the agent."""
     trials: int = 20
     """Trials in all, those of earlier calls included."""
     timesteps: int | None = None
     """Control steps to learn from in a trial; by default those of a training."""
     scenarios: int | Path = 200
-    """How many validation scenarios; or a TOML file with a scenario or a distribution of your own."""
+    """Number of validation scenarios; or a TOML file with a scenario or a distribution of your own."""
     seed: int = 0
-    """Of the search; trial k learns with seed + k, so that no seed is tuned for."""
+    """Seed of the search; trial k learns with seed + k, so that no seed is tuned for."""
     out: Path = Path("runs/tune")
     """Output folder, or that of a search to go on with."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require_choice("algorithm", self.algorithm, tuple(LEARNERS))
+        if find_learner(self.algorithm).search is None:
+            raise InvalidValue(f"algorithm = {self.algorithm!r}: has no search space in its SPEC")
         require_integer("trials", self.trials, low=1, high=10**6)
         if self.timesteps is not None:
             require_integer("timesteps", self.timesteps, low=1, high=10**12)

@@ -70,7 +70,7 @@ def leftover(
         truth = [altered(assumed[k], values[row]) for row, k in part]
         which = np.array([k for _, k in part])
         misinformed = Misinformed(policy, assumed, which)
-        seen = config.replaced({"observation": "state" if policy.knows is Knowledge.STATE else "sensors"})
+        seen = config.replaced(observation="state" if policy.knows is Knowledge.STATE else "sensors")
         left[begin : begin + len(part)] = run(misinformed, truth, seen).rms / still[which]
     return left.reshape(len(values), len(assumed))
 

@@ -44,7 +44,7 @@ class Options(RunOptions, ScenarioOptions):
     """"drum still", "S-Ω1", "S-Ω2", "H-Ω1", "H-Ω2", "drive map", or the folder of an agent."""
     bounds: ClassVar[tuple[int, int]] = (1, 10_000)
     scenarios: int | Path = 8
-    """How many held-out scenarios are assumed; or a TOML file with a scenario or a distribution of your own."""
+    """Number of held-out scenarios that are assumed; or a TOML file with a scenario or a distribution of your own."""
     points: int = 9
     """Values of each factor, one at a time."""
     samples: int = 128

@@ -1,1 +1,1 @@
-"""What the commands share: options, run folders, jobs, tables."""
+"""Shared parts of the commands: options, run folders, jobs, tables."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,21 +11,15 @@ import tomli_w
 import tyro
 from cattrs import Converter
 
-from aframe_env.serialization import strict_converter, structure, without_none
+from aframe_env.serialization import read_toml, strict_converter, structure, without_none
 from aframe_env.validation import InvalidValue
 
 T = TypeVar("T")
 
 
-def read_toml(path: Path, kind: type[T]) -> T:
-    """Options from a TOML file; keys that the command does not know are refused."""
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidValue(f"config = {str(path)!r}: cannot be read: {error}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InvalidValue(f"{path}: not TOML: {error}") from error
-    return structure(_converter(), data, kind, str(path))
+def read_options(path: Path, kind: type[T]) -> T:
+    """Read options from a TOML file; keys that the command does not know are refused."""
+    return structure(_converter(), read_toml(path, "config"), kind, str(path))
 
 
 def to_toml(options: Any) -> str:
@@ -56,7 +49,7 @@ def parse(kind: type[T], command: str, description: str, args: Sequence[str] | N
         if name == "--config":
             if not value and index + 1 >= len(args):
                 raise InvalidValue("--config needs a file")
-            default = read_toml(Path(value or args[index + 1]), kind)
+            default = read_options(Path(value or args[index + 1]), kind)
             del args[index : index + (1 if value else 2)]
             break
     epilog = description + "\n\n--config FILE.toml reads the options from a file; the rest overrides it."

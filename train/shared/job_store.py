@@ -70,7 +70,7 @@ class JobStore(Generic[Result]):
         return hashlib.sha256(text.encode()).hexdigest()
 
     def read(self, keys: Sequence[str]) -> dict[str, Result]:
-        """Those of the results that are there."""
+        """Read the stored results of these keys; missing ones are left out."""
         found: dict[str, Result] = {}
         for key in keys:
             row = self._database.execute("SELECT result FROM results WHERE key = ?", (key,)).fetchone()

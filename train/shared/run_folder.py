@@ -86,7 +86,7 @@ def command_line(name: str) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class RunOptions:
-    """Where a command writes."""
+    """Output folder of a command."""
 
     out: Path | None = None
     """Output folder; by default runs/COMMAND-DATE-TIME."""

@@ -1,4 +1,4 @@
-"""``--scenarios``: how many scenarios a command works on, and what they are drawn from."""
+"""``--scenarios``: number and origin of the scenarios that a command works on."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from aframe_env.validation import InvalidValue, require_integer
 
 @dataclass(frozen=True, kw_only=True)
 class ScenarioOptions:
-    """How many scenarios, and what they are drawn from."""
+    """Number and origin of scenarios."""
 
     bounds: ClassVar[tuple[int, int]] = (1, 10**6)
     """Fewest and most scenarios that the command works on."""
     scenarios: int | Path = 200
-    """How many scenarios; or a TOML file with a scenario or a distribution of your own to take them from."""
+    """Number of scenarios; or a TOML file with a scenario or a distribution of your own to take them from."""
     count: int | None = None
-    """How many scenarios of the file that --scenarios names; by default as many as without a file."""
+    """Number of scenarios of the file that --scenarios names; by default as many as without a file."""
 
     def __post_init__(self) -> None:
         if self.count is not None and not isinstance(self.scenarios, Path):
@@ -32,12 +32,12 @@ class ScenarioOptions:
 
     @property
     def number(self) -> int:
-        """How many scenarios."""
+        """Number of scenarios."""
         if not isinstance(self.scenarios, Path):
             return self.scenarios
         return type(self).scenarios if self.count is None else self.count  # type: ignore[return-value]
 
     @cached_property
     def source(self) -> ScenarioSource:
-        """What scenarios are drawn from; raises ``InvalidValue`` where the file is wrong."""
+        """Scenario or distribution to take them from; ``InvalidValue`` where the file is wrong."""
         return scenario_source(self.scenarios if isinstance(self.scenarios, Path) else None)

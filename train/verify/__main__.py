@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 import scipy
 
+from aframe_env.serialization import read_toml
 from aframe_env.validation import InvalidValue
 from train.shared.cli import parse
 from train.shared.run_folder import RunOptions, new_file, open_run, user_errors, write_json, write_text
@@ -36,7 +37,6 @@ from train.verify import frame_checks, run_checks
 from train.verify.cases import (
     FORMAT,
     dynamic_case,
-    read_toml,
     release_case,
     static_case,
     without_nan,
@@ -142,7 +142,7 @@ class Options:
 def run_case(kind: str, path: Path, options: Options) -> None:
     """Run one case, and write or print its result."""
     out = None if options.out is None else new_file(options.out, overwrite=options.overwrite)
-    result = without_nan(CASE_KINDS[kind](read_toml(path), path.parent))
+    result = without_nan(CASE_KINDS[kind](read_toml(path, kind), path.parent))
     if out is None:
         print(json.dumps(result, indent=2, allow_nan=False))
     else:

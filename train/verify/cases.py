@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -81,20 +80,6 @@ _MODEL = {"rfes", "layout", "corrected_shear"}
 _RUN = {"duration", "output_interval", "step"}
 _CRANE = {"servomotors", "servomotor_stiffness", "servomotor_damping", "frame"}
 _STATIC = {"own_weight", "rope_tension", "forces"}
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file.
-
-    Raises:
-        InvalidValue: No such file, or not TOML.
-    """
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InvalidValue(f"{path}: cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InvalidValue(f"{path}: is not TOML: {error}") from error
 
 
 def _only(data: Mapping[str, Any], allowed: set[str], where: str = "") -> None:

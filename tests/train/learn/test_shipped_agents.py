@@ -1,11 +1,11 @@
 """The shipped agents still do what the committed comparison says of them."""
 
-import csv
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from pyarrow.parquet import read_table
 
 from aframe_env import ScenarioDistribution
 from agents import load
@@ -19,9 +19,11 @@ ELSEWHERE = 0.02
 
 
 def committed(policy):
-    with (RESULTS / "comparison" / "comparison.csv").open(encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["policy"] == policy and int(row["scenario"]) < SCENARIOS]
-    return {name: np.array([float(row[name]) for row in rows]) for name in ("rms_m", "omega1_m2s", "omega2_m")}
+    chosen = [("policy", "==", policy), ("scenario", "<", SCENARIOS)]
+    columns = ("rms", "omega1", "omega2")
+    table = read_table(RESULTS / "comparison" / "episodes.parquet", columns=[*columns, "scenario"], filters=chosen)
+    table = table.sort_by("scenario")
+    return {name: table[name].to_numpy() for name in columns}
 
 
 @pytest.mark.parametrize(
@@ -38,6 +40,6 @@ def test_a_shipped_agent_meets_the_committed_figures(folder, policy):
     found = run(agent, held_out_scenarios(ScenarioDistribution(), SCENARIOS), observation=agent.card.observation)
     want = committed(policy)
     here = json.loads((RESULTS / "comparison" / "run.json").read_text(encoding="utf-8"))["versions"] == versions()
-    for name, values in (("rms_m", found.rms), ("omega1_m2s", found.omega1), ("omega2_m", found.omega2)):
+    for name, values in (("rms", found.rms), ("omega1", found.omega1), ("omega2", found.omega2)):
         assert len(want[name]) == SCENARIOS
         np.testing.assert_allclose(values, want[name], rtol=0.0 if here else ELSEWHERE)

@@ -22,7 +22,7 @@ def trials(folder):
 def small(monkeypatch):
     spec = find_learner("ppo")
     smaller = tune.replace(spec, options=lambda: tune.replace(spec.options(), n_envs=32))
-    monkeypatch.setattr(tune, "find_learner", {"ppo": smaller}.get)
+    monkeypatch.setattr(tune, "find_learner", {"ppo": smaller, "ppo-rsl": find_learner("ppo-rsl")}.get)
 
 
 def test_a_search_goes_on_where_it_ended(tmp_path, monkeypatch):
@@ -54,10 +54,18 @@ def test_another_search_in_the_same_folder_is_refused(tmp_path, monkeypatch, cap
     assert (out / "journal.log").read_bytes() == kept
 
 
-def test_bad_options_are_one_clear_line(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--trials", 0), "trials = 0: must be in [1, 1000000]"),
+        (("--algorithm", "dqn"), "algorithm = 'dqn': must be one of 'ppo', 'ppo-rsl', 'sac'"),
+        (("--algorithm", "ppo-rsl"), "algorithm = 'ppo-rsl': has no search space"),
+    ],
+)
+def test_bad_options_are_one_clear_line(arguments, words, tmp_path, monkeypatch, capsys):
     with pytest.raises(SystemExit):
-        command(monkeypatch, "--trials", 0, "--out", tmp_path / "study")
-    assert "trials = 0: must be in [1, 1000000]" in capsys.readouterr().err
+        command(monkeypatch, *arguments, "--out", tmp_path / "study")
+    assert words in capsys.readouterr().err
     assert not (tmp_path / "study").exists()
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from aframe_env import InvalidValue
 from train.learn import ppo
-from train.shared.cli import parse, read_toml, to_toml
+from train.shared.cli import parse, read_options, to_toml
 
 
 @dataclass(frozen=True)
@@ -26,9 +26,9 @@ def test_what_is_written_reads_back(tmp_path):
     for options in (Options(), Options(count=7, rate=1.0, kind="b", out=Path("x/y"), flag=True)):
         path = tmp_path / "options.toml"
         path.write_text(to_toml(options))
-        assert read_toml(path, Options) == options
+        assert read_options(path, Options) == options
     path.write_text(to_toml(ppo.Options(timesteps=5000, seed=3)))
-    assert read_toml(path, ppo.Options) == ppo.Options(timesteps=5000, seed=3)
+    assert read_options(path, ppo.Options) == ppo.Options(timesteps=5000, seed=3)
 
 
 def test_the_command_line_overrides_the_file(tmp_path):
@@ -54,7 +54,7 @@ def test_a_bad_file_is_named_with_its_key(text, words, tmp_path):
     path = tmp_path / "bad.toml"
     path.write_text(text)
     with pytest.raises(InvalidValue, match=words) as caught:
-        read_toml(path, Options)
+        read_options(path, Options)
     assert str(path) in str(caught.value)
 
 

@@ -1,4 +1,4 @@
-"""What the report shows, as plain figures: the page draws, it does not compute."""
+"""The report's data as plain figures: the page draws, it does not compute."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from train.evaluate.statistics import Entry, Interval, Row, compare, reductions
 Numbers = list[float]
 
 MOST_POINTS: Final = 400
-"""Of a curve or a cloud of points; more are thinned out evenly."""
+"""Most points of a curve or a cloud; more are thinned out evenly."""
 BINS: Final = 8
 MOST_PLACES: Final = 15
 """After the decimal point."""
@@ -34,12 +34,12 @@ QUANTILES: Final = {
     0.9: "90\u00a0% quantile",
     1.0: "worst in which every policy ran",
 }
-"""Of what the reference leaves: the scenarios to look at."""
+"""Quantiles of what the reference leaves: the scenarios to look at."""
 WORST: Final = ("worst of all", "second worst", "third worst", "fourth worst")
 WORST_SHARE: Final = 0.01
 FEWEST_WORST, MOST_WORST = 2, 10
 REMOVES_NOTHING: Final = 0.95
-"""What is left by a policy that does next to nothing."""
+"""Share that is left by a policy that does next to nothing."""
 SPECTRUM_SAMPLES: Final = 512
 """Samples in a segment of a spectrum: 51.2 s, so a resolution of 0.02 Hz."""
 TRAITS: Final = {
@@ -48,7 +48,7 @@ TRAITS: Final = {
     "load_mass": ("load mass, t", 1e-3),
     "rope_length": ("rope length, m", 1.0),
 }
-"""Of a scenario, that reduction is shown against: label, and factor from SI."""
+"""Traits of a scenario that reduction is shown against: label, and factor from SI."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Pair:
 
     scenarios: int
     difference: Interval
-    """Of the heave reduction, policy minus reference."""
+    """Difference of the heave reductions, policy minus reference."""
     ratio: Interval
     """RMS of the policy over RMS of the reference."""
     spread: tuple[float, float]
@@ -98,7 +98,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class Cloud:
-    """What one policy leaves in scenarios, point by point."""
+    """One policy's remainders in the scenarios, point by point."""
 
     scenarios: list[int]
     left: Numbers
@@ -172,7 +172,7 @@ class Content:
     """Drawn first where all would be too many: the drum still, the policy named first, the best of each knowledge."""
     subsets: list[Subset]
     pairs: list[list[Pair | None]]
-    """Of each policy (second index) beside each reference (first index); None beside itself or a perfect one."""
+    """Pairs of each policy (second index) beside each reference (first index); None beside itself or a perfect one."""
     clouds: list[Cloud]
     dependences: list[Dependence]
     examples: list[Example]

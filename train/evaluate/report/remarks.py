@@ -1,4 +1,4 @@
-"""What happened in an episode that went badly, said in words, each remark with its figure."""
+"""Remarks on an episode that went badly, each with its figure."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NEAR: Final = 0.15
 START: Final = 10.0
 """s that count as the start."""
 FEWEST_SAMPLES: Final = 200
-"""Of an error that has something to say of itself: after a rope that parts early there are not so many."""
+"""Fewest samples of an error worth a remark: after a rope that parts early there are not so many."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +40,13 @@ class Field:
 
 
 def intact(episodes: Episodes, index: int) -> int:
-    """How many of an episode's control steps there are to look at: all, or those until the rope parts."""
+    """Count an episode's control steps until the rope parts, or all."""
     tension = episodes.tension[index]
     return 1 + int(np.flatnonzero(tension)[-1]) if episodes.parted[index] and tension.any() else len(tension)
 
 
 def remarks(comparison: Comparison, field: Field, episodes: Episodes, index: int) -> list[str]:
-    """What is worth saying of one episode, the gravest first; never empty."""
+    """Collect the remarks on one episode, the gravest first; never empty."""
     found = [
         *_rope(episodes, index),
         *_winch(comparison, episodes, index),
