@@ -1,7 +1,6 @@
 """Learners by name.
 
-A new one is a module with a ``SPEC``, a line here, a door like ``train/ppo.py``, and that door's name among the layers
-in ``pyproject.toml``.
+A new one is a module with a ``SPEC``, a line here, and a door like ``train/ppo.py``.
 """
 
 from __future__ import annotations
