@@ -50,6 +50,15 @@ class WinchModel:
         _kernels().invert(self.speed, self.max_speed, self.max_acceleration, self._lag, self._period, turn, command)
         return command
 
+    def reach(self, speed: FloatArray) -> FloatArray:
+        """Find commands (N,) rad/s after which the drums turn at ``speed`` (N,) rad/s, or as near as may be.
+
+        The reckoned speed is carried to the end of the control step.
+        """
+        command = np.empty_like(speed)
+        _kernels().reach(self.speed, self.max_speed, self.max_acceleration, self._lag, self._period, speed, command)
+        return command
+
     def turn(self, command: FloatArray) -> FloatArray:
         """Find turns (N,) rad of the drums at these commands (N,) rad/s, and carry the reckoned speed on."""
         turned = np.empty_like(command)
@@ -61,6 +70,7 @@ class WinchModel:
 class _Kernels(NamedTuple):
     invert: Callable[..., None]
     follow: Callable[..., None]
+    reach: Callable[..., None]
 
 
 @scalar
@@ -86,6 +96,25 @@ def command_for(turn: float, speed: float, limit: float, acceleration: float, la
     return middle
 
 
+@scalar
+def command_to_reach(
+    wanted: float, speed: float, limit: float, acceleration: float, lag: float, period: float
+) -> float:
+    """Find the command [rad/s] within ± ``limit`` after which the drum turns at ``wanted`` [rad/s], or nearly so."""
+    if lag == 0.0:
+        return min(max(wanted, -limit), limit)
+    low, high = -limit, limit
+    middle = 0.0
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        _angle, reached = _advance(middle, speed, acceleration, lag, period)
+        if reached < wanted:
+            low = middle
+        else:
+            high = middle
+    return middle
+
+
 @cache
 def _kernels() -> _Kernels:
     @kernel
@@ -98,4 +127,10 @@ def _kernels() -> _Kernels:
         for i in range(command.shape[0]):
             turned[i], speed[i] = _advance(command[i], speed[i], acceleration[i], lag[i], period)
 
-    return _Kernels(invert, follow)
+    @kernel
+    def reach(speed, limit, acceleration, lag, period, wanted, command):  # type: ignore[no-untyped-def]
+        for i in range(wanted.shape[0]):
+            command[i] = command_to_reach(wanted[i], speed[i], limit[i], acceleration[i], lag[i], period)
+            _, speed[i] = _advance(command[i], speed[i], acceleration[i], lag[i], period)
+
+    return _Kernels(invert, follow, reach)
