@@ -22,6 +22,7 @@ from aframe_env.scenario import Scenario, Sensors
 from aframe_env.validation import InvalidValue
 from agents.control.feedback import SensorFeedback, StateFeedback
 from agents.control.inverse_dynamics import InverseDynamics
+from agents.control.optimum import CommandSequence, optimise
 from agents.control.predictive import PredictiveControl
 from agents.drives import map as drive_map
 from agents.drives.map_policy import DriveMapPolicy
@@ -105,7 +106,16 @@ def _law(make: Callable[[Sensors], Policy]) -> PolicySpec:
     return PolicySpec(make(Sensors()).name, lambda context: make(context.sensors))
 
 
+def _optimum(context: BuildContext) -> Policy:
+    return CommandSequence(OPTIMUM.name, optimise(context.scenarios, context.config).commands)
+
+
+def _output_zero(sees: Callable[[BuildContext], Sensors | None], name: str) -> PolicySpec:
+    return PolicySpec(name, lambda context: learned.output_zero(sees(context), context.config.control_period))
+
+
 DRUM_STILL: Final = PolicySpec("drum still", _drum_still)
+OPTIMUM: Final = PolicySpec("winch-limited optimum", _optimum)
 REGISTRY: Final[dict[str, PolicySpec]] = {
     spec.name: spec
     for spec in (
@@ -115,6 +125,9 @@ REGISTRY: Final[dict[str, PolicySpec]] = {
         _law(lambda sensors: SensorFeedback(delay=sensors.delay)),
         _law(lambda sensors: PredictiveControl(sensors=sensors)),
         _law(lambda sensors: InverseDynamics()),
+        _output_zero(lambda context: None, "output zero"),
+        _output_zero(lambda context: context.sensors, "output zero on sensors"),
+        OPTIMUM,
         *(_drive_for_each(f"{name} for each scenario", how) for name, how in TUNED.items()),
     )
 }

@@ -166,3 +166,27 @@ def load(folder: str | Path) -> LearnedPolicy:
     except (RuntimeError, SafetensorError) as error:
         raise InvalidValue(f"{path / WEIGHTS}: not the weights of the network in {CARD}: {error}") from error
     return LearnedPolicy(actor, card)
+
+
+def output_zero(sensors: Sensors | None, control_period: float) -> LearnedPolicy:
+    """Return an agent whose network says nothing: the hand-written base of all agents, alone.
+
+    ``sensors``: those it acts on, or None for the full state. What a trained agent removes beyond this is learned.
+    """
+    features = feature_names(STATE if sensors is None else SENSED)
+    actor = Actor(len(features), 1)
+    for parameter in actor.parameters():
+        torch.nn.init.zeros_(parameter)
+    card = AgentCard(
+        algorithm="output zero",
+        observation="state" if sensors is None else "sensors",
+        sensors=sensors,
+        features=features,
+        hidden=1,
+        control_period=control_period,
+        seed=0,
+        timesteps=0,
+        versions={},
+        sha256=digest(serialise(actor)),
+    )
+    return LearnedPolicy(actor, card)

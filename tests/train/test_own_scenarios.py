@@ -50,7 +50,9 @@ def test_train_and_compare_on_ones_own(own, tmp_path, monkeypatch):
     policies = ("--policies", out, "feed-forward + feedback", "predictive control")
     few = ("--count", 4, "--privileged", 0, "--out", compared)
     assert command(monkeypatch, "train.evaluate.__main__", "--scenarios", own, *policies, *few) == 0
-    rows = {row["policy"]: row for row in json.loads((compared / "comparison.json").read_text(encoding="utf-8"))}
+    rows = {
+        row["policy"]: row for row in json.loads((compared / "comparison.json").read_text(encoding="utf-8"))["policies"]
+    }
     assert rows["feed-forward + feedback"]["scenarios"] == 4
     parquet = pytest.importorskip("pyarrow.parquet").read_table(compared / "episodes.parquet").to_pydict()
     assert set(parquet["load_mass"]) == {40e3}

@@ -57,7 +57,7 @@ the heave measured all along, the map becomes feed-forward of that heave with th
 
 def summary(seas: Sequence[InSea]) -> str:
     """Heave reduction of every policy in every kind of sea, as Markdown."""
-    policies, column = [row.policy for row in seas[0].rows[1:]], HEADINGS.index("heave reduction")
+    policies, column = [row.policy for row in seas[0].rows[1:]], HEADINGS.index("median")
     return table(["sea", *policies], ([sea.kind, *(cells(row)[column] for row in sea.rows[1:])] for sea in seas))
 
 

@@ -69,6 +69,6 @@ def compare_in(
             entries.append(Entry(policy.name, policy.knows, run(policy, met, config)))
             progress.advance(bar)
         rows = compare(entries, entries[0].episodes)
-        write_comparison(folder / kind.replace(" ", "-"), rows, entries)
+        write_comparison(folder / kind.replace(" ", "-"), rows, rows, entries)
         found.append(InSea(kind, entries, rows))
     return found

@@ -34,6 +34,8 @@ class Options(RunOptions, HeldOut):
         "results/agents/sac-sensors",
         "results/drive-map",
         *AFTER_TRAINING,
+        "output zero",
+        "output zero on sensors",
         "predictive control",
         "inverse dynamics",
     )

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Final
 
 import matplotlib
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from agents.policy import Knowledge
 from agents.rollout import Episodes
-from train.evaluate.statistics import Entry, reductions
+from train.evaluate.statistics import Entry, Row, family, reductions
 from train.shared.run_folder import write_atomically
 
 GREY = "#8a8f98"
@@ -22,61 +23,106 @@ COLOURS = tuple(to_hex(colour) for colour in _PALETTE if len(set(colour[:3])) > 
 """All but the greys: dark ones first."""
 
 
-def comparison_figure(path: Path, entries: Sequence[Entry], still: Episodes) -> None:
-    """Share of scenarios above a heave reduction; and one scenario's depth error over time.
+TICKS: Final = (1.0, 0.5, 0.2, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003)
+"""What is left, where reductions are labelled: from 0 to 90 % is as far as from 90 to 99 %."""
+LEAST: Final = 1e-4
+
+
+def comparison_figure(path: Path, entries: Sequence[Entry], still: Episodes, families: Sequence[Row]) -> None:
+    """Draw the share of scenarios above a heave reduction, one scenario's error, and each policy's mean and tail.
 
     Of agents that differ in their seed alone the first is shown, and the others' profiles as thin lines of its colour.
     """
-    figure = Figure(figsize=(11.0, 7.6), layout="constrained")
-    profile, history, magnified = figure.subplot_mosaic([["p", "h"], ["p", "m"]], width_ratios=[1.0, 1.25]).values()
-    kinds = list(dict.fromkeys(_kind(entry) for entry in entries[1:]))
-    colour = {_kind(entries[0]): GREY} | {kind: COLOURS[i % len(COLOURS)] for i, kind in enumerate(kinds)}
-    first = {_kind(entry): entry.policy for entry in reversed(entries)}
-    for entry in entries:
-        reduction = np.sort(reductions(entry, still))
-        if entry.policy == entries[0].policy:
-            continue
-        share = 1.0 - np.arange(len(reduction)) / len(reduction)
-        # 1 - reduction on a logarithmic axis: from 0 to 90 % is as far as from 90 to 99 %.
-        left = np.maximum(1.0 - reduction, 1e-4)
-        style = "--" if entry.knows is Knowledge.FUTURE else "-"
-        width = 2.0 if entry.policy in first.values() else 0.7
-        profile.step(left, share, style, where="post", color=colour[_kind(entry)], lw=width)
-    profile.set_xscale("log")
-    profile.set_xlim(3.0, 2e-4)
-    ticks = [1.0, 0.5, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003]
-    profile.set_xticks(ticks, [f"{100 * (1 - t):.4g}%" for t in ticks])
-    profile.minorticks_off()
-    profile.set_xlabel("heave reduction 1 − RMS / RMS(drum still)")
-    profile.set_ylabel("share of scenarios with at least this reduction")
-    profile.set_ylim(0.0, 1.02)
-    profile.grid(alpha=0.3)
-    profile.set_title("Held-out scenarios (dashed: knows the future)", fontsize=11)
-    example = int(np.argsort(still.rms)[len(still.rms) // 2])
-    shown = min(len(e.episodes.rms) for e in entries)
-    example = example if example < shown else int(np.argmax(still.rms[:shown]))
-    for axis in (history, magnified):
-        for entry in entries:
-            if entry.policy not in first.values():
-                continue
-            error = entry.episodes.error[example]
-            times = np.linspace(0.0, entry.episodes.duration, len(error))
-            style = "--" if entry.knows is Knowledge.FUTURE else "-"
-            axis.plot(times, error, style, color=colour[_kind(entry)], lw=1.3, label=entry.policy)
-        axis.set_ylabel("depth error, m")
-        axis.grid(alpha=0.3)
-        axis.set_xlim(0.0, still.duration)
-    limit = 1.15 * float(np.abs(still.error[example]).max())
-    history.set_ylim(-limit, limit)
-    history.set_title(f"Scenario {example}: depth error, and the same magnified", fontsize=11)
-    magnified.set_ylim(-0.06 * limit, 0.06 * limit)
-    magnified.set_xlabel("time, s")
-    figure.legend(
-        *history.get_legend_handles_labels(), loc="outside lower center", ncols=min(5, len(first)), fontsize=9
-    )
+    kinds = list(dict.fromkeys(family(entry.policy) for entry in entries[1:]))
+    colour = {family(entries[0].policy): GREY} | {kind: COLOURS[i % len(COLOURS)] for i, kind in enumerate(kinds)}
+    figure = Figure(figsize=(13.0, max(7.6, 2.0 + 0.36 * len(families))), layout="constrained")
+    profile, history, means = figure.subplot_mosaic([["p", "m"], ["h", "m"]], width_ratios=[1.0, 1.1]).values()
+    _draw_profiles(profile, entries, still, colour)
+    _draw_history(history, entries, still, families, colour)
+    _draw_means(means, families[1:], colour)
     write_atomically(path, lambda temporary: figure.savefig(temporary, dpi=130))
 
 
-def _kind(entry: Entry) -> str:
-    """The policy, whatever its seed."""
-    return re.sub(r", seed \d+$", "", entry.policy)
+def _style(knows: str) -> str:
+    return "--" if knows == Knowledge.FUTURE.value else "-"
+
+
+def _reduction_axis(axis: Axes) -> None:
+    axis.set_xscale("log")
+    axis.set_xlim(1.5, LEAST)
+    axis.set_xticks(TICKS, [f"{100 * (1 - t):.4g}%" for t in TICKS])
+    axis.minorticks_off()
+    axis.grid(alpha=0.3)
+    axis.tick_params(axis="x", labelsize=8)
+
+
+def _draw_profiles(axis: Axes, entries: Sequence[Entry], still: Episodes, colour: Mapping[str, str]) -> None:
+    first = {family(entry.policy): entry.policy for entry in reversed(entries)}
+    for entry in entries[1:]:
+        reduction = np.sort(reductions(entry, still))
+        share = 1.0 - np.arange(len(reduction)) / len(reduction)
+        width = 1.8 if entry.policy in first.values() else 0.6
+        kind = family(entry.policy)
+        left = np.maximum(1.0 - reduction, LEAST)
+        axis.step(left, share, _style(entry.knows.value), where="post", color=colour[kind], lw=width)
+    _reduction_axis(axis)
+    axis.set_ylim(0.0, 1.02)
+    axis.set_xlabel("heave reduction 1 − RMS / RMS(drum still)")
+    axis.set_ylabel("share of scenarios with at least this")
+    axis.set_title("Held-out scenarios (dashed: knows the future)", fontsize=11)
+
+
+def _draw_history(
+    axis: Axes, entries: Sequence[Entry], still: Episodes, families: Sequence[Row], colour: Mapping[str, str]
+) -> None:
+    """Draw the depth error of one scenario: the drum still, and the best in the mean of each knowledge."""
+    best: dict[str, Row] = {}
+    for row in families[1:]:
+        if row.scenarios == len(still.rms) and (row.knows not in best or row.mean.value > best[row.knows].mean.value):
+            best[row.knows] = row
+    chosen = [entries[0], *(next(e for e in entries if e.policy.startswith(_first(row))) for row in best.values())]
+    example = int(np.argsort(still.rms)[len(still.rms) // 2])
+    for entry in chosen:
+        error = abs(entry.episodes.error[example]) + 1e-4
+        times = np.linspace(0.0, entry.episodes.duration, len(error))
+        line = _style(entry.knows.value)
+        axis.plot(times, error, line, color=colour[family(entry.policy)], lw=1.2, label=entry.policy)
+    axis.set_yscale("log")
+    axis.set_ylim(5e-4, None)
+    axis.set_xlim(0.0, still.duration)
+    axis.set_xlabel("time, s")
+    axis.set_ylabel("|depth error|, m")
+    axis.grid(alpha=0.3)
+    axis.legend(fontsize=8, loc="lower center", ncols=2)
+    axis.set_title(f"Scenario {example}, the median sea: the best of each knowledge", fontsize=11)
+
+
+def _draw_means(axis: Axes, rows: Sequence[Row], colour: Mapping[str, str]) -> None:
+    """Draw mean (dot) and mean of the worst 5 % (ring) with their intervals, the best mean on top."""
+    shares = all(row.share is not None for row in rows)
+    ranked = sorted(rows, key=lambda row: (row.share or row.mean).value if shares else row.mean.value)
+    for place, row in enumerate(ranked):
+        kind = family(row.policy.removesuffix(f", {row.seeds} seeds"))
+        pair = (row.share, row.share_tail) if shares else (row.mean, row.tail)
+        for figure, face in zip(pair, (colour[kind], "white"), strict=True):
+            assert figure is not None
+            left = np.clip(1.0 - np.array([figure.value, figure.low, figure.high]), LEAST, 1.4)
+            axis.plot(left[1:], [place, place], "-", color=colour[kind], lw=1.4)
+            axis.plot(left[0], place, "o", color=colour[kind], markerfacecolor=face, markersize=6)
+    _reduction_axis(axis)
+    axis.set_yticks(range(len(ranked)), [f"{row.policy}  ({_short(row.knows)})" for row in ranked], fontsize=8)
+    axis.set_ylim(-0.7, len(ranked) - 0.3)
+    axis.yaxis.tick_right()
+    what = "share of the winch-limited optimum" if shares else "heave reduction"
+    axis.set_xlabel(f"{what}: mean (dot), mean of the worst 5 % (ring), 95 % intervals; 0 % or less at the left edge")
+    axis.xaxis.label.set_fontsize(8)
+    axis.set_title("Mean and tail", fontsize=11)
+
+
+def _first(row: Row) -> str:
+    """Name of a row's first policy, or the beginning of it."""
+    return row.policy.removesuffix(f", {row.seeds} seeds") if row.seeds > 1 else row.policy
+
+
+def _short(knows: str) -> str:
+    return knows.split(" (")[0]

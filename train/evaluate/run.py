@@ -15,18 +15,20 @@ from aframe_env import task
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario
 from aframe_env.validation import require_integer
+from agents.control.optimum import saturating
 from agents.drives.tuned import TUNED
 from agents.policy import Knowledge, Policy
-from agents.registry import DRUM_STILL, BuildContext, PolicySpec, as_spec, choose_all
+from agents.registry import DRUM_STILL, OPTIMUM, BuildContext, PolicySpec, as_spec, choose_all
 from agents.rollout import Episodes, held_out_scenarios, run
 from train.evaluate.figure import comparison_figure
-from train.evaluate.statistics import Entry, Row, compare
+from train.evaluate.statistics import Entry, Mask, Row, compare, compare_families
 from train.evaluate.tables import rich_table, write_comparison
 from train.shared.jobs import run_jobs
 from train.shared.scenarios import ScenarioOptions
 
 AFTER_TRAINING: Final = (
     *TUNED,
+    OPTIMUM.name,
     "feed-forward + feedback (state)",
     "feed-forward + feedback",
     "S-Ω1 for each scenario",
@@ -86,9 +88,24 @@ class Comparison:
         return self.entries[0].episodes
 
     @cached_property
+    def optimum(self) -> Episodes | None:
+        """Episodes of the winch-limited optimum, if it was among the policies."""
+        return next((entry.episodes for entry in self.entries if entry.policy == OPTIMUM.name), None)
+
+    @cached_property
+    def saturating(self) -> Mask:
+        """Whether holding the load still asks more of the winch than it has, in each scenario (N,)."""
+        return saturating(self.scenarios, self.config)
+
+    @cached_property
     def rows(self) -> list[Row]:
         """Every policy's figures."""
-        return compare(self.entries, self.still)
+        return compare(self.entries, self.still, self.optimum, self.saturating)
+
+    @cached_property
+    def families(self) -> list[Row]:
+        """The same, agents that differ in their seed alone together."""
+        return compare_families(self.entries, self.still, self.optimum, self.saturating)
 
 
 def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console) -> Comparison:
@@ -135,9 +152,9 @@ def _observation(policy: Policy, config: TaskConfig) -> task.Observation:
 
 def write(folder: Path, comparison: Comparison, console: Console) -> None:
     """Write figures, table and picture of a comparison into a folder, and print the table."""
-    console.print(rich_table(comparison.rows))
-    write_comparison(folder, comparison.rows, comparison.entries)
-    comparison_figure(folder / "comparison.png", comparison.entries, comparison.still)
+    console.print(rich_table(comparison.families))
+    write_comparison(folder, comparison.families, comparison.rows, comparison.entries)
+    comparison_figure(folder / "comparison.png", comparison.entries, comparison.still, comparison.families)
     console.print(f"comparison: {folder / 'comparison.md'}, {folder / 'comparison.png'}")
 
 

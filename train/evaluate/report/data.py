@@ -305,11 +305,11 @@ def _pair(still: Entry, first: Entry, second: Entry) -> tuple[Pair, Pair] | tupl
 
 
 def _minus(interval: Interval) -> Interval:
-    return Interval(-interval.median, -interval.high, -interval.low)
+    return Interval(-interval.value, -interval.high, -interval.low)
 
 
 def _exp(interval: Interval) -> Interval:
-    return Interval(math.exp(interval.median), math.exp(interval.low), math.exp(interval.high))
+    return Interval(math.exp(interval.value), math.exp(interval.low), math.exp(interval.high))
 
 
 def _cloud(left: FloatArray) -> Cloud:

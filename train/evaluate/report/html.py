@@ -65,7 +65,7 @@ def _page(comparison: Comparison, command: str) -> str:
 def _group(shown: Content, subset: Subset, kind: Knowledge) -> list[tuple[int, Row]]:
     """Place and figures of the policies that know so much, the best first."""
     places = [i for i, policy in enumerate(shown.policies) if policy.knows == kind.value]
-    return [(i, subset.figures[i]) for i in sorted(places, key=lambda i: -subset.figures[i].reduction.median)]
+    return [(i, subset.figures[i]) for i in sorted(places, key=lambda i: -subset.figures[i].reduction.value)]
 
 
 def _ranges(shown: Content) -> list[tuple[str, float, float]]:

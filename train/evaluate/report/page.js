@@ -183,14 +183,14 @@
     const found = everyone.map((policy) => [policy, report.pairs[reference][policy]]).filter(([, pair]) => pair);
     // Privileged policies stand apart, below all others.
     const rank = ([policy]) => (report.policies[policy].privileged ? 1 : 0);
-    found.sort((a, b) => rank(a) - rank(b) || a[1].ratio.median - b[1].ratio.median);
+    found.sort((a, b) => rank(a) - rank(b) || a[1].ratio.value - b[1].ratio.value);
     const ends = found.flatMap(([, pair]) => [...pair.spread, pair.ratio.low, pair.ratio.high]);
     const places = found.map((_, place) => found.length - 1 - place);
     const traces = found.flatMap(([policy, pair], index) => [
       { x: pair.spread, y: [places[index], places[index]], mode: "lines", line: { color: tint(policy), width: 1.5 }, hoverinfo: "skip" },
       { x: [pair.ratio.low, pair.ratio.high], y: [places[index], places[index]], mode: "lines", line: { color: tint(policy), width: 10 }, opacity: 0.5, hoverinfo: "skip" },
       {
-        x: [pair.ratio.median], y: [places[index]], mode: "markers", name: marked(policy),
+        x: [pair.ratio.value], y: [places[index]], mode: "markers", name: marked(policy),
         marker: { color: report.policies[policy].privileged ? colour("ground") : tint(policy), size: 8, line: { color: tint(policy), width: 2 } },
         hovertemplate: `%{fullData.name}: %{x:.3g} times the RMS error<br>better in ${percent(pair.better)}<extra></extra>`,
       },
@@ -216,8 +216,8 @@
       const d = pair.difference, r = pair.ratio;
       const cells = [
         [pair.scenarios],
-        [signed(100 * d.median), `${signed(100 * d.low)} … ${signed(100 * d.high)}`],
-        [rounded(r.median), `${rounded(r.low)} … ${rounded(r.high)}`],
+        [signed(100 * d.value), `${signed(100 * d.low)} … ${signed(100 * d.high)}`],
+        [rounded(r.value), `${rounded(r.low)} … ${rounded(r.high)}`],
         [percent(pair.better)],
       ].map(([main, small]) => {
         const cell = document.createElement("td");
