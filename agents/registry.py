@@ -28,6 +28,7 @@ from agents.drives import map as drive_map
 from agents.drives.map_policy import DriveMapPolicy
 from agents.drives.optimisation import OptimisedDrive
 from agents.drives.policy import DrivePolicy
+from agents.drives.realtime_map import RealTimeMapPolicy
 from agents.drives.tuned import TUNED, Tuned, optimised
 from agents.learned import agent as learned
 from agents.policy import DrumStill, FloatArray, Knowledge, Policy
@@ -133,11 +134,30 @@ REGISTRY: Final[dict[str, PolicySpec]] = {
 }
 """Policies by name."""
 
-FOLDERS: Final[dict[str, Callable[[Path], Policy]]] = {
-    learned.CARD: learned.load,
-    drive_map.CARD: lambda folder: DriveMapPolicy(drive_map.load(folder)),
+
+def _agent(folder: Path) -> PolicySpec:
+    return as_spec(learned.load(folder))
+
+
+def _map_in_real_time(folder: Path) -> PolicySpec:
+    stored = drive_map.load(folder)
+    return _law(lambda sensors: RealTimeMapPolicy(stored, sensors))
+
+
+def _map_on_the_state(folder: Path) -> PolicySpec:
+    return as_spec(RealTimeMapPolicy(drive_map.load(folder), None))
+
+
+def _map_by_the_clock(folder: Path) -> PolicySpec:
+    policy = DriveMapPolicy(drive_map.load(folder))
+    return PolicySpec(policy.name, lambda context: replace(policy, duration=context.config.duration))
+
+
+FOLDERS: Final[dict[str, dict[str, Callable[[Path], PolicySpec]]]] = {
+    learned.CARD: {"": _agent},
+    drive_map.CARD: {"": _map_in_real_time, "state": _map_on_the_state, "clock": _map_by_the_clock},
 }
-"""Loaders of a policy from a folder, by the file that the folder must have."""
+"""Loaders of policies from a folder, by the file that it must have, then by the word after a colon behind its path."""
 
 
 def slug(name: str) -> str:
@@ -146,18 +166,29 @@ def slug(name: str) -> str:
 
 
 def choose(text: str) -> PolicySpec:
-    """Return the policy of that name in the registry (or the name's slug), folder, or ``module:function``."""
+    """Return the policy of that name in the registry (or the name's slug), folder, or ``module:function``.
+
+    The folder of a drive map is the map in real time, on the sensors; with ``:state`` behind it that on the full state,
+    with ``:clock`` the map by the clock, as in ``results/drive-map:clock``.
+    """
     by_slug = {slug(name): spec for name, spec in REGISTRY.items()}
     if slug(text) in by_slug:
         return by_slug[slug(text)]
     if Path(text).is_dir():
-        return as_spec(_from_folder(Path(text)))
+        return _from_folder(Path(text))
+    folder, colon, word = text.rpartition(":")
+    kinds = _kinds_in(Path(folder)) if colon else {}
+    if word in kinds:
+        return kinds[word](Path(folder))
+    if kinds:
+        known = " or ".join(repr(f":{each}") for each in kinds if each) or "nothing"
+        raise InvalidValue(f"policy = {text!r}: behind this folder may stand {known}")
     module, colon, attribute = text.partition(":")
     if colon and module.replace(".", "").isidentifier() and attribute.isidentifier():
         return _from_module(text, module, attribute)
     raise InvalidValue(
         f"policy = {text!r}: must be one of {', '.join(repr(name) for name in REGISTRY)}, "
-        "the folder of an agent, or module:function"
+        "the folder of an agent or a drive map, or module:function"
     )
 
 
@@ -186,12 +217,17 @@ def as_spec(policy: Policy) -> PolicySpec:
     return PolicySpec(policy.name, lambda context: policy)
 
 
-def _from_folder(folder: Path) -> Policy:
-    for file, load_it in FOLDERS.items():
-        if (folder / file).is_file():
-            return load_it(folder)
+def _kinds_in(folder: Path) -> dict[str, Callable[[Path], PolicySpec]]:
+    """Loaders of the policies in a folder, by the words for them; none where it holds none."""
+    return next((kinds for file, kinds in FOLDERS.items() if (folder / file).is_file()), {})
+
+
+def _from_folder(folder: Path) -> PolicySpec:
+    kinds = _kinds_in(folder)
+    if kinds:
+        return kinds[""](folder)
     if learned.seeds(folder):
-        return learned.load(folder)
+        return as_spec(learned.load(folder))
     raise InvalidValue(f"policy = {str(folder)!r}: no agent in this folder: it has none of {', '.join(FOLDERS)}")
 
 

@@ -135,7 +135,19 @@ class WaveFilter:
 
     def heave(self) -> FloatArray:
         """Rise (N,) m of the pulley since the start, and the offset."""
-        return np.asarray((self._state[:, :-1] / self._exponent).real.sum(axis=1) + self._state[:, -1].real)
+        return np.asarray(self.phasors().real.sum(axis=1) + self._state[:, -1].real)
+
+    @property
+    def exponents(self) -> ComplexArray:
+        """Exponents λ (bands,) 1/s of the oscillators: each one's phasor goes with exp(λ t)."""
+        return self._exponent
+
+    def phasors(self) -> ComplexArray:
+        """Phasors z (N, bands) m of the oscillators' heave at the latest reading's moment of measurement.
+
+        Σ Re(z exp(λ t)) is the heave ``t`` s after it, about the mean of the waves.
+        """
+        return np.asarray(self._state[:, :-1] / self._exponent)
 
     def rate(self, times: FloatArray) -> FloatArray:
         """Velocity (T, N) m/s of the pulley, ``times`` (T,) s after the latest reading's moment of measurement."""

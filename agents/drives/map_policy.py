@@ -39,7 +39,7 @@ class DriveMapPolicy:
             self.name, self.knows = "drive map, every wave known", Knowledge.FUTURE
             self.measured = "load mass, rope length, every wave's amplitude, period and phase"
         else:
-            self.name, self.knows = "drive map", Knowledge.CLOCK
+            self.name, self.knows = "drive map by the clock", Knowledge.CLOCK
             self.measured = (
                 f"load mass, rope length, the crane tip's heave over the {self.measurement.record:g} s before the start"
             )

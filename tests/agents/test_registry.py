@@ -1,10 +1,12 @@
+import dataclasses
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
-from aframe_env import InvalidValue, ScenarioDistribution
+from aframe_env import InvalidValue, ScenarioDistribution, Sensors
 from aframe_env.config import TaskConfig
 from agents import load
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, card_text, digest, serialise
@@ -13,6 +15,8 @@ from agents.learned.network import Actor
 from agents.policy import Knowledge
 from agents.registry import REGISTRY, BuildContext, choose, choose_all, slug
 from agents.rollout import held_out_scenarios
+
+MAP = str(Path(__file__).parents[2] / "results" / "drive-map")
 
 
 def write_agent(folder, seed):
@@ -76,6 +80,33 @@ def test_the_laws_are_there_with_what_they_know(name):
     policy = choose(name).build(context())
     assert policy.name == name
     assert policy.knows in (Knowledge.STATE, Knowledge.SENSORS, Knowledge.FUTURE)
+
+
+@pytest.mark.parametrize(
+    ("word", "name", "knows"),
+    [
+        ("", "drive map in real time", Knowledge.SENSORS),
+        (":state", "drive map in real time (state)", Knowledge.STATE),
+        (":clock", "drive map by the clock", Knowledge.CLOCK),
+    ],
+)
+def test_a_folder_with_a_drive_map_is_the_map_in_real_time_or_what_stands_behind_it(word, name, knows):
+    spec = choose(MAP + word)
+    policy = spec.build(context())
+    assert (spec.name, policy.name, policy.knows) == (name, name, knows)
+
+
+def test_a_drive_map_is_built_for_the_task():
+    late = Sensors(delay=0.3)
+    config = TaskConfig(episode_duration=90.0, scenario=ScenarioDistribution(sensors=late))
+    task = dataclasses.replace(context(), config=config)
+    assert choose(MAP).build(task).sensors == late
+    assert choose(f"{MAP}:clock").build(task).duration == 90.0
+
+
+def test_a_word_that_means_nothing_behind_a_folder_is_refused():
+    with pytest.raises(InvalidValue, match="behind this folder may stand ':state' or ':clock'"):
+        choose(f"{MAP}:absent")
 
 
 def push(observation):

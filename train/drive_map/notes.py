@@ -35,11 +35,13 @@ heave in the median, {error_worst:.1e} at most. The map's drive leaves {left_med
 {left_worst:.1e}), the optimum, free to shift its frequency too, {best_median:.1e} (worst {best_worst:.1e}).
 
 ## In seas
-In the environment, with the winch's limits, over 60 s, {scenarios} held-out scenarios of each kind. "Drive map"
-measures the crane tip's heave for some minutes before the start, fits harmonics to it, and then goes by the clock
-alone. With "every wave known" it is told every component with its phase, which in a linear sea is the whole future:
-what the map itself is worth, as far as superposition holds. The last column knows the future too. Heave reduction
-1 − RMS / RMS(drum still), median and 95 % bootstrap interval:
+In the environment, with the winch's limits, over 60 s, {scenarios} held-out scenarios of each kind. "In real time" a
+filter of the motion unit's heave rate tells the waves of the moment, and the map gives the drives for them; it acts on
+the sensors, with their noise and delay, and has no feedback of the load. "By the clock" the crane tip's heave is
+measured for some minutes before the start, harmonics are fitted to it, and then the time alone counts. With "every wave
+known" it is told every component with its phase, which in a linear sea is the whole future: what the map itself is
+worth, as far as superposition holds. The last column knows the future too. Heave reduction 1 − RMS / RMS(drum still),
+median and 95 % bootstrap interval:
 
 {summary}
 Where even a drive that knows the future falls short, the sea asks more of the winch than it has (Hs above 3 m), or
@@ -47,10 +49,10 @@ there is next to nothing to remove (a regular wave shorter than 3 s moves the ti
 the map is behind a fresh optimisation by what is not linear in the waves: the tip also sinks with the squares of the
 ship's roll and pitch, and the load's swing hoists it. Where the ship only heaves the difference goes.
 
-So the map is right, and what fails in a random sea is the forecast: phases measured at the start are worth about one
-wave there, and a drive that runs by the clock for a minute is soon out of step. Measuring notices this (it takes from
-the harmonics only what they have forecast of the record itself) and leaves the drum nearly still. In real time, with
-the heave measured all along, the map becomes feed-forward of that heave with the gain above.
+So the map is right, and what fails by the clock in a random sea is the forecast: phases measured at the start are worth
+about one wave there, and a drive that runs by the clock for a minute is soon out of step. Measuring notices this (it
+takes from the harmonics only what they have forecast of the record itself) and leaves the drum nearly still. In real
+time, with the heave measured all along, the map becomes feed-forward of that heave with the gain above.
 
 {tables}"""
 

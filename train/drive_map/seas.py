@@ -14,8 +14,10 @@ from aframe_env.scenario import Scenario, ScenarioSource
 from agents.drives.map import DriveMap
 from agents.drives.map_policy import DriveMapPolicy
 from agents.drives.policy import DrivePolicy
+from agents.drives.realtime_map import RealTimeMapPolicy
 from agents.policy import DrumStill, Knowledge, Policy
 from agents.rollout import held_out_scenarios, run
+from train.evaluate.run import observation_of
 from train.evaluate.statistics import Entry, Row, compare
 from train.evaluate.tables import write_comparison
 from train.shared.scenarios import ScenarioOptions
@@ -54,19 +56,22 @@ def compare_in(
     drawn = {kind: held_out_scenarios(source, scenarios.number) for kind, source in kinds.items()}
     every = [scenario for each in drawn.values() for scenario in each]
     tuned = tune(("S-Ω1",), every, config.duration, optimiser="gauss-newton", workers=workers, progress=progress)
+    sensors = config.replaced(observation="sensors").sensors
     best = iter(tuned["S-Ω1"])
-    bar = progress.add_task("seas", total=4 * len(kinds))
+    bar = progress.add_task("seas", total=5 * len(kinds))
     found = []
     for kind, met in drawn.items():
         policies: list[Policy] = [
             DrumStill(),
+            RealTimeMapPolicy(drive_map, sensors),
             DriveMapPolicy(drive_map, duration=config.duration),
             DriveMapPolicy(drive_map, None, duration=config.duration),
             DrivePolicy("S-Ω1 for each scenario", list(islice(best, len(met))), Knowledge.FUTURE),
         ]
         entries = []
         for policy in policies:
-            entries.append(Entry(policy.name, policy.knows, run(policy, met, config)))
+            episodes = run(policy, met, config.replaced(observation=observation_of(policy, config)))
+            entries.append(Entry(policy.name, policy.knows, episodes))
             progress.advance(bar)
         rows = compare(entries, entries[0].episodes)
         write_comparison(folder / kind.replace(" ", "-"), rows, rows, entries)

@@ -1,9 +1,9 @@
 """Compare policies on the same held-out scenarios: ``python -m train.evaluate --policies results/agents/ppo S-Ω1``.
 
-A policy is a name ("S-Ω1", or s-omega1 on a keyboard without Ω), the folder of an agent, or module:function for your
-own: see ``agents.registry``. The drum left alone is always there as the yardstick. Writes the table (Markdown, JSON,
-PNG), every episode (CSV, Parquet), and report.html: one page with figures, pictures and the worst cases, which opens in
-any browser, offline.
+A policy is a name ("S-Ω1", or s-omega1 on a keyboard without Ω), the folder of an agent or a drive map, or
+module:function for your own: see ``agents.registry``. The drum left alone is always there as the yardstick. Writes the
+table (Markdown, JSON, PNG), every episode (CSV, Parquet), and report.html: one page with figures, pictures and the
+worst cases, which opens in any browser, offline.
 """
 
 from __future__ import annotations
@@ -33,13 +33,14 @@ class Options(RunOptions, HeldOut):
         "results/agents/ppo-sensors",
         "results/agents/sac-sensors",
         "results/drive-map",
+        "results/drive-map:clock",
         *AFTER_TRAINING,
         "output zero",
         "output zero on sensors",
         "predictive control",
         "inverse dynamics",
     )
-    """Names, folders of agents (of all seeds, where there are several), or module:function."""
+    """Names, folders of agents (of all seeds, where there are several) or of drive maps, or module:function."""
     report: bool = True
     """Write report.html and episodes.parquet too (extra "report")."""
 

@@ -134,14 +134,15 @@ def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console) ->
             episodes = run(
                 policy,
                 mine,
-                config.replaced(observation=_observation(policy, config)),
+                config.replaced(observation=observation_of(policy, config)),
                 progress=lambda step, bar=bar: progress.update(bar, completed=step),  # type: ignore[misc]
             )
             entries.append(Entry(spec.name, policy.knows, episodes))
     return Comparison(tuple(entries), tuple(scenarios), config)
 
 
-def _observation(policy: Policy, config: TaskConfig) -> task.Observation:
+def observation_of(policy: Policy, config: TaskConfig) -> task.Observation:
+    """Observation that a policy acts on: by its knowledge, or else the task's own."""
     seen: dict[Knowledge, task.Observation] = {
         Knowledge.STATE: "state",
         Knowledge.FUTURE: "state",

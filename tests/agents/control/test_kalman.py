@@ -54,6 +54,8 @@ def test_the_wave_filter_is_the_conditional_mean():
     ahead = np.linspace(0.0, 1.5, 1501)
     rate = waves.rate(ahead)[:, 0]
     assert waves.path(ahead[-1:])[0, 0] == pytest.approx(np.trapezoid(rate, ahead), abs=1e-6)
+    phasors = waves.phasors()[0] * np.exp(np.outer([0.0, 1.5], waves.exponents))
+    assert np.diff(phasors.real.sum(axis=1))[0] == pytest.approx(waves.path(ahead[-1:])[0, 0], abs=1e-12)
     assert waves.heave()[1] == 0.0  # the other row's readings were all zero
 
 

@@ -7,7 +7,7 @@ from agents.drives.tuned import TUNED
 from train.evaluate import __main__ as evaluate
 
 RESULTS = Path(__file__).parents[3] / "results"
-AGENT, MAP = RESULTS / "agents" / "ppo" / "seed-0", RESULTS / "drive-map"
+AGENT, MAP = RESULTS / "agents" / "ppo" / "seed-0", f"{RESULTS / 'drive-map'}:clock"
 
 
 def command(monkeypatch, *arguments):
@@ -23,7 +23,7 @@ def test_the_committed_agent_is_as_good_as_the_results_say(model, tmp_path, monk
     rows = {row["policy"]: row for row in json.loads((out / "comparison.json").read_text(encoding="utf-8"))["policies"]}
     assert rows["PPO"]["reduction"]["value"] > 0.95
     assert rows["PPO"]["worse_than_still"] == 0
-    assert {"S-Ω1", "S-Ω2", "H-Ω1", "H-Ω2", "drive map"} <= set(rows)
+    assert {"S-Ω1", "S-Ω2", "H-Ω1", "H-Ω2", "drive map by the clock"} <= set(rows)
     assert all(row["knows"] == "clock" for name, row in rows.items() if name not in ("PPO", "drum still"))
     assert json.loads((out / "run.json").read_text())["command"].startswith("python -m train.evaluate --policies")
 
