@@ -3,7 +3,15 @@ PYTHON ?= python3
 ARGS ?=
 BIN := .venv/bin
 
-.PHONY: train drives test verify results bench check clean
+.DEFAULT_GOAL := help
+
+.PHONY: help train drives test verify results bench check clean
+
+help:
+	@echo "make train     learn to hold the load still and compare the agent (some five minutes)"
+	@echo "make test      run the whole suite (some ten minutes)"
+	@echo "make check     lint, format, layers, types"
+	@echo "make drives | verify | results | bench | clean"
 
 train: .venv/installed
 	$(BIN)/python -m train.ppo $(ARGS)

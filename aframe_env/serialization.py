@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar
@@ -69,7 +70,11 @@ def _first(error: BaseException) -> str:
 
 
 def _message(error: BaseException, kind: type | None) -> str:
-    del kind
+    if isinstance(error, AttributeError) or (isinstance(error, TypeError) and kind is not None):
+        return "must be a table"
+    counted = re.fullmatch(r"(?:Not enough|Too many) values in .* to structure as tuple\[(.*)\]", str(error))
+    if counted:
+        return f"must be {counted[1].count(',') + 1} numbers"
     if isinstance(error, ForbiddenExtraKeysError):
         known = ", ".join(sorted(name for name in getattr(error.cl, "__dataclass_fields__", {})))
         return f"unknown key {sorted(error.extra_fields)[0]!r}: must be one of {known}"

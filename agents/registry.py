@@ -77,6 +77,8 @@ class PolicySpec:
     build: Callable[[BuildContext], Policy]
     for_each_scenario: bool = False
     """True if building it takes an optimisation for each scenario: it then runs in the first few of them only."""
+    control_period: float | None = None
+    """Control step that an agent was trained at, s; None: any."""
 
 
 def _drum_still(context: BuildContext) -> Policy:
@@ -214,7 +216,8 @@ def _expanded(text: str) -> list[str]:
 
 def as_spec(policy: Policy) -> PolicySpec:
     """Wrap a policy that exists already."""
-    return PolicySpec(policy.name, lambda context: policy)
+    period = policy.card.control_period if isinstance(policy, learned.LearnedPolicy) else None
+    return PolicySpec(policy.name, lambda context: policy, control_period=period)
 
 
 def _kinds_in(folder: Path) -> dict[str, Callable[[Path], PolicySpec]]:

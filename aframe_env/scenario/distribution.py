@@ -108,7 +108,16 @@ class ScenarioDistribution:
             self._build(np.full(SUBSTREAM, u), np.full(SUBSTREAM, u), np.full(SUBSTREAM, u))
 
     def _require_records(self) -> None:
-        """Raise where a record is none, or shorter than the stretch that is drawn from it."""
+        """Raise where a record is none, or shorter than the stretch that is drawn from it, or a sea is given beside."""
+        if not self.records:
+            if self.window != ScenarioDistribution.window:
+                raise InvalidValue(f"window = {self.window:g} s: goes with records, and there are none")
+            return
+        for name in ("hs", "tp", "heading", "gamma", "spectrum", "spreading", "components"):
+            if getattr(self, name) != getattr(ScenarioDistribution, name):
+                raise InvalidValue(
+                    f"{name} = {getattr(self, name)!r}: goes with seas, and records stand in their place"
+                )
         for record in self.records:
             if not isinstance(record, RecordedMotion):
                 raise InvalidValue(f"records: {record!r} is not a RecordedMotion")

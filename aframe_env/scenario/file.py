@@ -86,6 +86,16 @@ def scenario_of(data: Mapping[str, Any], folder: Path, source: str) -> Scenario:
     return structure(_converter(folder), data, Scenario, source)
 
 
+def _require_kind(data: Mapping[str, Any], source: str) -> None:
+    """Raise where what looks like a distribution does not say that it is one."""
+    own = {each.name for each in fields(_Distribution)} - {each.name for each in fields(Scenario)}
+    found = sorted(own & set(data))
+    if found:
+        raise InvalidValue(
+            f'{source}: {found[0]!r} belongs to a distribution: begin the file with kind = "distribution"'
+        )
+
+
 def scenarios_of(data: Mapping[str, Any], folder: Path, source: str) -> ScenarioSource:
     """Make a scenario of what a file says, or with ``kind = "distribution"`` a distribution."""
     rest = dict(data)
@@ -95,6 +105,8 @@ def scenarios_of(data: Mapping[str, Any], folder: Path, source: str) -> Scenario
     except InvalidValue as error:
         raise InvalidValue(f"{source}: {error}") from None
     if kind == "scenario":
+        if "kind" not in data:
+            _require_kind(data, source)
         return scenario_of(rest, folder, source)
     return _distribution(structure(_converter(folder), rest, _Distribution, source), folder, source)
 

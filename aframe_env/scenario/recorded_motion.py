@@ -123,9 +123,10 @@ class RecordedWindow:
         require_number("start", self.start, "s", low=0.0, high=longest - self.duration)
 
     @property
-    def path(self) -> Path | None:
-        """The record's file, if it was read from one."""
-        return self.record.path
+    def origin(self) -> str:
+        """Words for the window, in messages."""
+        record = "the recorded motion" if self.record.path is None else str(self.record.path)
+        return f"the window of {record}"
 
     def at(self, times: npt.ArrayLike) -> FloatArray:
         """Coordinates, rates and accelerations at ``times`` (T,) s from the window's start: array (3, T, 6)."""

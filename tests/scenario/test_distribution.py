@@ -169,7 +169,10 @@ def test_an_environment_takes_files_and_mappings(tmp_path):
         ('kind = "seas"', r"mine.toml: kind = 'seas': must be one of 'scenario', 'distribution'"),
         ('kind = "distribution"\nhs = [2.0, 1.0]', r"hs = \(2.0, 1.0\) m: the low end is above the high end"),
         ('kind = "distribution"\nhs = "big"', r"\[hs\] 'big': must be a number"),
-        ('kind = "distribution"\nhs = [1.0]', r"mine.toml: \[hs\]"),
+        ('kind = "distribution"\nhs = [1.0]', r"mine.toml: \[hs\] must be 2 numbers"),
+        ('kind = "distribution"\ncrane = "big"', r"mine.toml: \[crane\] must be a table"),
+        ("hs = [1.0, 2.0]", 'mine.toml: .hs. belongs to a distribution: begin the file with kind = "distribution"'),
+        ('kind = "distribution"\nwindow = 30.0', r"mine.toml: window = 30 s: goes with records, and there are none"),
         ('kind = "distribution"\nwaves = 1', r"unknown key 'waves': must be one of"),
         ('kind = "distribution"\ngamma = "broad"', r"gamma = 'broad': must be 'dnv', a number or"),
         ('kind = "distribution"\nrecords = ["absent.csv"]', r"absent.csv: cannot be read"),
@@ -193,6 +196,8 @@ def test_bad_records():
         ScenarioDistribution(records=("x.csv",))
     with pytest.raises(InvalidValue, match=r"start = 1.0 s: must be in \[0, 0\] s"):
         RecordedWindow(record=record(50.0), start=1.0, duration=50.0)
+    with pytest.raises(InvalidValue, match=r"hs = 2.0: goes with seas, and records stand in their place"):
+        ScenarioDistribution(records=(record(99.0),), hs=2.0)
     source = ScenarioDistribution(records=(record(99.0),))
     env = gymnasium.make("AFrameHeave-v0", scenario=source, episode_duration=90.0)
     with pytest.raises(InvalidValue, match="episode_duration = 90 s"):

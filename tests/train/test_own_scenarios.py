@@ -59,7 +59,7 @@ def test_train_and_compare_on_ones_own(own, tmp_path, monkeypatch):
     assert set(parquet["tp"]) == {8.0}
 
 
-def test_a_period_of_ones_own_is_compared_at_it(tmp_path, monkeypatch):
+def test_a_period_of_ones_own_is_compared_at_it(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("train.evaluate.run.AFTER_TRAINING", ("feed-forward + feedback",))
     out = tmp_path / "agent"
     few = ("--eval-scenarios", 1, "--eval-privileged", 0, "--out", out)
@@ -71,6 +71,10 @@ def test_a_period_of_ones_own_is_compared_at_it(tmp_path, monkeypatch):
     options = ("--policies", out, "--scenarios", 2, "--privileged", 0, "--no-report", "--out", compared)
     assert command(monkeypatch, "train.evaluate.__main__", *options, "--control-period", 0.2) == 0
     assert "control_period = 0.2" in (compared / "config.toml").read_text()
+    with pytest.raises(SystemExit):
+        command(monkeypatch, "train.evaluate.__main__", *options[:-1], tmp_path / "another")
+    assert "control_period = 0.1 s: PPO was trained at 0.2 s, as by --control-period 0.2" in capsys.readouterr().err
+    assert not (tmp_path / "another").exists()
 
 
 def test_optimisers_and_sensitivity_on_ones_own(own, tmp_path, monkeypatch):

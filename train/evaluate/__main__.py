@@ -16,7 +16,7 @@ from rich.console import Console
 
 from aframe_env.validation import InvalidValue
 from agents.registry import choose_all
-from train.evaluate.run import AFTER_TRAINING, HeldOut, run_all, write
+from train.evaluate.run import AFTER_TRAINING, HeldOut, require_period, run_all, write
 from train.shared.cli import parse
 from train.shared.run_folder import RunOptions, open_run, user_errors
 
@@ -58,6 +58,7 @@ def main() -> int:
     with user_errors():
         options, console = parse(Options, "train.evaluate", __doc__ or ""), Console()
         choices = choose_all(options.policies)
+        require_period(choices, options.control_period)
         opened = open_run(options, "train.evaluate")
         opened.record(options)
         folder = opened.folder

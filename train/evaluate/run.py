@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from aframe_env import task
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario
-from aframe_env.validation import require_integer
+from aframe_env.validation import InvalidValue, require_integer
 from agents.control.optimum import saturating
 from agents.drives.tuned import TUNED
 from agents.policy import Knowledge, Policy
@@ -52,7 +52,7 @@ class HeldOut(ScenarioOptions):
     rfem_modes: int | None = None
     """Number of natural modes to keep with rfem; all by default."""
     control_period: float = TaskConfig.control_period
-    """Control step, s; an agent runs at the one that it was trained at."""
+    """Control step, s: that at which the agents among the policies were trained."""
     episode_duration: float = TaskConfig.episode_duration
     """s."""
 
@@ -106,6 +106,16 @@ class Comparison:
     def families(self) -> list[Row]:
         """The same, agents that differ in their seed alone together."""
         return compare_families(self.entries, self.still, self.optimum, self.saturating)
+
+
+def require_period(specs: Sequence[PolicySpec], control_period: float) -> None:
+    """Raise where an agent was trained at another control step [s]."""
+    for spec in specs:
+        if spec.control_period is not None and abs(spec.control_period - control_period) > 1e-9:
+            raise InvalidValue(
+                f"control_period = {control_period:g} s: {spec.name} was trained at {spec.control_period:g} s, as by "
+                f"--control-period {spec.control_period:g}"
+            )
 
 
 def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console) -> Comparison:

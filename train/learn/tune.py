@@ -40,7 +40,7 @@ class Options(ScenarioOptions):
     """Learner, and size of the search."""
 
     algorithm: str = "ppo"
-    """Learner, by its name in ``train.learn.registry``."""
+    """Learner: ppo or sac, or another of ``train.learn.registry`` that has a search space."""
     observation: Literal["state", "sensors"] = "state"
     """Observation of the agent."""
     trials: int = 20
