@@ -9,6 +9,8 @@ from pyarrow import parquet
 
 import agents
 from aframe_env import ScenarioDistribution
+from agents.drives import map as drive_map
+from agents.drives.realtime_map import RealTimeMapPolicy
 from agents.policy import DrumStill
 from agents.rollout import held_out_scenarios, run
 
@@ -111,3 +113,19 @@ def test_the_feed_forward_alone_removes_what_the_readme_says(agent, observation,
     monkeypatch.setattr(policy, "_output", lambda inputs: np.zeros(len(inputs)))
     left = run(policy, scenarios, observation=observation).rms / run(DrumStill(), scenarios).rms
     assert 100.0 * (1.0 - np.median(left)) == pytest.approx(float(said), abs=0.5)
+
+
+def test_the_map_in_real_time_removes_what_the_page_says():
+    scenarios = held_out_scenarios(ScenarioDistribution(), 200)
+    still = run(DrumStill(), scenarios).rms
+    stored = drive_map.load(ROOT / "results/drive-map")
+    sensed, on_state = RealTimeMapPolicy(stored), RealTimeMapPolicy(stored, None)
+    said = {}
+    for line in table(ROOT / "docs/results.md", "| policy | knows | median | mean | mean of the worst 5 % |")[2:]:
+        name, knows, *figures = cells(line)
+        said[name, knows] = [float(figure.removesuffix(" %")) for figure in figures]
+    assert list(said) == [(policy.name, policy.knows.value) for policy in (sensed, on_state)]
+    for policy, observation in ((sensed, "sensors"), (on_state, "state")):
+        reduction = 100.0 * np.sort(1.0 - run(policy, scenarios, observation=observation).rms / still)
+        found = [np.median(reduction), reduction.mean(), reduction[:10].mean()]
+        assert found == pytest.approx(said[policy.name, policy.knows.value], abs=0.1)

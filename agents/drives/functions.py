@@ -1,7 +1,11 @@
 """Open-loop drives: the drum angle as a function of time, φ_H(t) with φ_H(0) = 0.
 
-The paper's eqs. (33)-(36) name a cubic spline and a "pseudo-harmonic" function and their decision variables;
-its exact text is not available to us. Each class below says which form it takes.
+The paper's spline (33) is φ_H = a_i t³ + b_i t² + c_i t + d_i on each interval, with the decision variables (35)
+X = [φ_H⁰, φ_H¹, …, φ_H^m], its values at the knots. Its pseudo-harmonic function (34) is
+φ_H = A_0 + Σ_i A_i sin(ω_i t + α_i,0), with (36) X = [A_0, A_1, ω_1, α_1,0, …, A_n, ω_n, α_n,0].
+
+There φ_H⁰ and A_0 are variables. A drum that starts elsewhere than at 0 has moved the load before the start: the drives
+here start at φ_H(0) = 0, and have one variable less.
 """
 
 from __future__ import annotations
@@ -52,11 +56,11 @@ def _finite(name: str, values: tuple[float, ...]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class SplineDrive:
-    """Cubic spline on n equal intervals of [0, t_k], eq. (33); decision variables (35).
+    """Cubic spline on n equal intervals of [0, t_k], eq. (33); decision variables (35) without φ_H⁰, which is 0.
 
-    Form taken: twice continuously differentiable through φ_H(0) = 0 and the values at the knots t_1 .. t_n, with
-    natural ends (no second derivative at 0 and t_k): the least curved of all interpolants, and the one whose speed
-    at t = 0 is free to meet that of a deck already under way.
+    It is twice continuously differentiable through φ_H(0) = 0 and the values at the knots t_1 .. t_n. Its ends are
+    natural (no second derivative at 0 and t_k), which is our choice: the least curved of all interpolants, and the one
+    whose speed at t = 0 is free to meet that of a deck already under way.
     """
 
     duration: float
@@ -108,10 +112,10 @@ def spline_matrices(duration: float, intervals: int, times: FloatArray) -> tuple
 
 @dataclass(frozen=True, kw_only=True)
 class HarmonicDrive:
-    """Pseudo-harmonic drive, eq. (34); decision variables (36).
+    """Pseudo-harmonic drive, eq. (34); decision variables (36) without A_0.
 
-    Form taken: φ_H(t) = Σ_i a_i (sin(ω_i t + α_i) - sin α_i), i = 1 .. n: harmonics of free amplitude,
-    frequency and phase, and the constant that makes φ_H(0) = 0.
+    φ_H(t) = Σ_i a_i (sin(ω_i t + α_i) - sin α_i), i = 1 .. n: harmonics of free amplitude, frequency and phase.
+    A_0 = -Σ_i a_i sin α_i is no variable, but the constant that makes φ_H(0) = 0.
     """
 
     duration: float

@@ -29,10 +29,11 @@ PAPER = """\
   {ratio:.0%} of critical damping; the table of variants below shows what else they could be. With an undamped rope
   the 18-interval spline excites the load's bobbing (2.4 s, near the 2 s between its knots), which never dies. A load
   that starts with the deck's velocity, 1.05 m/s, bobs by 0.4 m at once, and no drive of these families stops that.
-- The spline ends with no second derivative, the harmonic is a sum of sines of free amplitude, frequency and phase;
-  the exact text of (33)-(36) is not available to us. Nelder-Mead (unless the command names another optimiser) starts
-  from the inverse of the geometry and is restarted until a round gains less than 0.2 %, where the paper says only
-  that it was used; Ω2 starts from the optimum of Ω1.
+- In the paper the spline's value at the start, φ_H⁰ in (35), and the harmonic's constant, A_0 in (36), are decision
+  variables. A drum that starts elsewhere than at 0 has moved the load before the start: the drives here start at
+  φ_H(0) = 0, and have one variable less. The spline ends with no second derivative.
+- Nelder-Mead (unless the command names another optimiser) starts from the inverse of the geometry and is restarted
+  until a round gains less than 0.2 %, where the paper says only that it was used; Ω2 starts from the optimum of Ω1.
 - The simplified model (rigid frame) is optimised on; the drum follows the drive exactly, as in the paper, from a
   running start: dφ/dt at 0 is not zero.
 
