@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from agents.policy import Knowledge
 from agents.rollout import Episodes
-from train.evaluate.statistics import Entry, Row, family, reductions
+from train.evaluate.statistics import Entry, Interval, Row, family, reductions
 from train.shared.run_folder import write_atomically
 
 GREY = "#8a8f98"
@@ -26,6 +26,7 @@ COLOURS = tuple(to_hex(colour) for colour in _PALETTE if len(set(colour[:3])) > 
 TICKS: Final = (1.0, 0.5, 0.2, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003)
 """What is left, where reductions are labelled: from 0 to 90 % is as far as from 90 to 99 %."""
 LEAST: Final = 1e-4
+_ALL: Final = Interval(1.0, 1.0, 1.0)
 
 
 def comparison_figure(path: Path, entries: Sequence[Entry], still: Episodes, families: Sequence[Row]) -> None:
@@ -36,10 +37,10 @@ def comparison_figure(path: Path, entries: Sequence[Entry], still: Episodes, fam
     kinds = list(dict.fromkeys(family(entry.policy) for entry in entries[1:]))
     colour = {family(entries[0].policy): GREY} | {kind: COLOURS[i % len(COLOURS)] for i, kind in enumerate(kinds)}
     figure = Figure(figsize=(13.0, max(7.6, 2.0 + 0.36 * len(families))), layout="constrained")
-    profile, history, means = figure.subplot_mosaic([["p", "m"], ["h", "m"]], width_ratios=[1.0, 1.1]).values()
-    _draw_profiles(profile, entries, still, colour)
-    _draw_history(history, entries, still, families, colour)
-    _draw_means(means, families[1:], colour)
+    axes = figure.subplot_mosaic([["profiles", "means"], ["history", "means"]], width_ratios=[1.0, 0.9])
+    _draw_profiles(axes["profiles"], entries, still, colour)
+    _draw_history(axes["history"], entries, still, families, colour)
+    _draw_means(axes["means"], families[1:], colour)
     write_atomically(path, lambda temporary: figure.savefig(temporary, dpi=130))
 
 
@@ -100,6 +101,7 @@ def _draw_history(
 def _draw_means(axis: Axes, rows: Sequence[Row], colour: Mapping[str, str]) -> None:
     """Draw mean (dot) and mean of the worst 5 % (ring) with their intervals, the best mean on top."""
     shares = all(row.share is not None for row in rows)
+    rows = [row for row in rows if not shares or row.share != _ALL]  # the optimum itself
     ranked = sorted(rows, key=lambda row: (row.share or row.mean).value if shares else row.mean.value)
     for place, row in enumerate(ranked):
         kind = family(row.policy.removesuffix(f", {row.seeds} seeds"))
@@ -114,9 +116,8 @@ def _draw_means(axis: Axes, rows: Sequence[Row], colour: Mapping[str, str]) -> N
     axis.set_ylim(-0.7, len(ranked) - 0.3)
     axis.yaxis.tick_right()
     what = "share of the winch-limited optimum" if shares else "heave reduction"
-    axis.set_xlabel(f"{what}: mean (dot), mean of the worst 5 % (ring), 95 % intervals; 0 % or less at the left edge")
-    axis.xaxis.label.set_fontsize(8)
-    axis.set_title("Mean and tail", fontsize=11)
+    axis.set_xlabel(f"{what}; what is below 0 % stands at the left edge", fontsize=8)
+    axis.set_title("Mean (dot), mean of the worst 5 % (ring), 95 % intervals", fontsize=11)
 
 
 def _first(row: Row) -> str:
