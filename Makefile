@@ -40,7 +40,7 @@ results: .venv/installed-test
 	$(BIN)/python -m train.verify
 
 test: .venv/installed-test
-	$(BIN)/python -m pytest $(ARGS)
+	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
 check: .venv/installed-test
 	$(BIN)/ruff check .

@@ -19,7 +19,7 @@ SCENARIOS = 4
 ELSEWHERE = 0.02
 """Relative: another processor or library rounds otherwise, and a closed loop forgets that but for its noise."""
 EXACT = {"drive map in real time": 1e-12}
-"""Relative, on the platform of the committed figures: the magnitude of a complex number rounds by its place in an array."""
+"""Relative, where all else is exact: the magnitude of a complex number rounds by its place in an array."""
 POLICIES = choose_all(
     [
         *(str(RESULTS / "agents" / name) for name in ("ppo", "sac", "ppo-sensors", "sac-sensors")),
