@@ -24,10 +24,11 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import scipy
+import tyro
 
 from aframe_env.serialization import read_toml
 from aframe_env.validation import InvalidValue
@@ -111,7 +112,7 @@ def write_report(checks: Sequence[Check], folder: Path) -> None:
 class Options:
     """All checks, or one case."""
 
-    load_case: Path | None = None
+    load_case: Annotated[Path | None, tyro.conf.arg(aliases=("--static",))] = None
     """Run one static load case, from a TOML file."""
     release: Path | None = None
     """Run one release of a static load, from a TOML file."""
