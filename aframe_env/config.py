@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 
 from aframe_env import task
 from aframe_env.flexible_engine import Mesh, mesh_of
-from aframe_env.scenario import ScenarioDistribution, ScenarioSource, Sensors
+from aframe_env.scenario import Scenario, ScenarioDistribution, ScenarioSource, Sensors
 from aframe_env.scenario.file import scenario_source
 from aframe_env.validation import InvalidValue, require_choice, require_number
 
@@ -69,6 +69,11 @@ class TaskConfig:
         if self.observation == "state":
             return None
         return self.source.sensors if isinstance(self.source, ScenarioDistribution) else Sensors()
+
+    @property
+    def nominal(self) -> Scenario:
+        """The one scenario, or that in the middle of every interval."""
+        return self.source if isinstance(self.source, Scenario) else self.source.nominal()
 
     @property
     def quantities(self) -> tuple[task.Quantity, ...]:

@@ -56,12 +56,15 @@ class BuildContext:
 
     scenarios: Sequence[Scenario]
     """Scenarios that it will run in. Only a policy that knows the future may look at their seas."""
-    nominal: Scenario
-    """Scenario that a policy that knows no more than the clock may be tuned for."""
     config: TaskConfig
     """The task; its observation is what a policy sees that is not made for another."""
     spread: Spread = in_turn
     """Map over independent computations, for policies that take many of them to build."""
+
+    @property
+    def nominal(self) -> Scenario:
+        """Scenario that a policy that knows no more than the clock may be tuned for."""
+        return self.config.nominal
 
     @property
     def sensors(self) -> Sensors:

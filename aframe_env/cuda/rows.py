@@ -33,7 +33,7 @@ class CudaRows:
         source = host.source
         self._components = _count_components(source)
         engine = Engine(1, host.control_period, self._components, host.config.max_inner_step)
-        vector = engine.row_vector(source if isinstance(source, Scenario) else source.nominal())
+        vector = engine.row_vector(host.config.nominal)
         self._room = (len(vector) - at.ROW_SLOTS) // at.COMPONENT_SLOTS
         self._segments = round(host.control_period / vector[at.CONTROL_PERIOD])
         # A device array cannot be empty; no row follows the line that stands in.

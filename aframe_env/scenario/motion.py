@@ -97,8 +97,7 @@ def require_coverage(motion: ShipMotion, name: str, duration: float) -> None:
     """Raise unless the motion is known for ``duration`` s, which the user calls ``name``."""
     known = getattr(motion, "duration", math.inf)
     if known < duration * (1.0 - 1e-9):
-        path = getattr(motion, "path", None)
-        record = getattr(motion, "origin", "the recorded motion" if path is None else str(path))
+        record = getattr(motion, "origin", "the recorded motion")
         raise InvalidValue(f"{name} = {duration:g} s: must be in (0, {known:g}] s, the length of {record}")
 
 

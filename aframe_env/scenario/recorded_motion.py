@@ -84,6 +84,11 @@ class RecordedMotion:
         return cls(times=times, coordinates=coordinates, path=Path(path))
 
     @property
+    def origin(self) -> str:
+        """Words for the record, in messages."""
+        return "the recorded motion" if self.path is None else str(self.path)
+
+    @property
     def duration(self) -> float:
         """Time from the first sample to the last, s."""
         return float(self.times[-1])
@@ -125,8 +130,7 @@ class RecordedWindow:
     @property
     def origin(self) -> str:
         """Words for the window, in messages."""
-        record = "the recorded motion" if self.record.path is None else str(self.record.path)
-        return f"the window of {record}"
+        return f"the window of {self.record.origin}"
 
     def at(self, times: npt.ArrayLike) -> FloatArray:
         """Coordinates, rates and accelerations at ``times`` (T,) s from the window's start: array (3, T, 6)."""

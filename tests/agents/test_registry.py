@@ -43,7 +43,6 @@ def context(count=2):
     distribution = ScenarioDistribution()
     return BuildContext(
         scenarios=held_out_scenarios(distribution, count),
-        nominal=distribution.nominal(),
         config=TaskConfig(episode_duration=10.0),
     )
 

@@ -81,7 +81,10 @@ def _draw_history(
     for row in families[1:]:
         if row.scenarios == len(still.rms) and (row.knows not in best or row.mean.value > best[row.knows].mean.value):
             best[row.knows] = row
-    chosen = [entries[0], *(next(e for e in entries if e.policy.startswith(_first(row))) for row in best.values())]
+    chosen = [
+        entries[0],
+        *(next(e for e in entries if family(e.policy) == family(row.policy)) for row in best.values()),
+    ]
     example = int(np.argsort(still.rms)[len(still.rms) // 2])
     for entry in chosen:
         error = abs(entry.episodes.error[example]) + 1e-4
@@ -104,7 +107,7 @@ def _draw_means(axis: Axes, rows: Sequence[Row], colour: Mapping[str, str]) -> N
     rows = [row for row in rows if not shares or row.share != _ALL]  # the optimum itself
     ranked = sorted(rows, key=lambda row: (row.share or row.mean).value if shares else row.mean.value)
     for place, row in enumerate(ranked):
-        kind = family(row.policy.removesuffix(f", {row.seeds} seeds"))
+        kind = family(row.policy)
         pair = (row.share, row.share_tail) if shares else (row.mean, row.tail)
         for figure, face in zip(pair, (colour[kind], "white"), strict=True):
             assert figure is not None
@@ -118,11 +121,6 @@ def _draw_means(axis: Axes, rows: Sequence[Row], colour: Mapping[str, str]) -> N
     what = "share of the winch-limited optimum" if shares else "heave reduction"
     axis.set_xlabel(f"{what}; what is below 0 % stands at the left edge", fontsize=8)
     axis.set_title("Mean (dot), mean of the worst 5 % (ring), 95 % intervals", fontsize=11)
-
-
-def _first(row: Row) -> str:
-    """Name of a row's first policy, or the beginning of it."""
-    return row.policy.removesuffix(f", {row.seeds} seeds") if row.seeds > 1 else row.policy
 
 
 def _short(knows: str) -> str:

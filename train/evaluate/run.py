@@ -100,12 +100,17 @@ class Comparison:
     @cached_property
     def rows(self) -> list[Row]:
         """Every policy's figures."""
-        return compare(self.entries, self.still, self.optimum, self.saturating)
+        return compare(self.entries, self.still, *self._yardsticks)
 
     @cached_property
     def families(self) -> list[Row]:
         """The same, agents that differ in their seed alone together."""
-        return compare_families(self.entries, self.still, self.optimum, self.saturating)
+        return compare_families(self.entries, self.still, *self._yardsticks)
+
+    @property
+    def _yardsticks(self) -> tuple[Episodes, Mask] | tuple[()]:
+        """Optimum, and where the winch saturates, if the optimum was among the policies."""
+        return () if self.optimum is None else (self.optimum, self.saturating)
 
 
 def require_period(specs: Sequence[PolicySpec], control_period: float) -> None:
@@ -121,8 +126,7 @@ def require_period(specs: Sequence[PolicySpec], control_period: float) -> None:
 def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console) -> Comparison:
     """Run the drum still and every policy that was chosen over the held-out scenarios."""
     config = held_out.config
-    source = config.source
-    scenarios = held_out_scenarios(source, held_out.number)
+    scenarios = held_out_scenarios(config.source, held_out.number)
     first = scenarios[: held_out.privileged]
     entries = []
     with Progress(
@@ -135,7 +139,6 @@ def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console) ->
             policy = spec.build(
                 BuildContext(
                     scenarios=mine,
-                    nominal=source if isinstance(source, Scenario) else source.nominal(),
                     config=config,
                     spread=partial(run_jobs, progress=progress, description=f"{spec.name}: preparing"),
                 )

@@ -156,8 +156,8 @@ def compare_families(
 
 
 def family(policy: str) -> str:
-    """Name of a policy without its seed."""
-    return re.sub(r", seed \d+$", "", policy)
+    """Name of a policy, or of a row of several, without its seeds."""
+    return re.sub(r", (?:seed \d+|\d+ seeds)$", "", policy)
 
 
 def _row(

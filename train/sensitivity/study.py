@@ -98,10 +98,7 @@ def _policy(job: Job) -> Policy:
     if job.name in TUNED:
         return DrivePolicy(job.name, job.drives, Knowledge.FUTURE)
     scenarios = assumed_scenarios(job.options)
-    source = job.options.source
-    nominal = source if isinstance(source, Scenario) else source.nominal()
-    context = BuildContext(scenarios=scenarios, nominal=nominal, config=job.options.config)
-    return choose(job.name).build(context)
+    return choose(job.name).build(BuildContext(scenarios=scenarios, config=job.options.config))
 
 
 def study(job: Job) -> Sensitivity:

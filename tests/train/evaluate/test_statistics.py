@@ -6,7 +6,7 @@ import pytest
 
 from agents.policy import Knowledge
 from agents.rollout import Episodes
-from train.evaluate.statistics import Entry, Interval, compare, compare_families, reductions, tail_mean
+from train.evaluate.statistics import Entry, Interval, compare, compare_families, family, reductions, tail_mean
 from train.evaluate.tables import CAPTION, markdown_table, write_comparison
 
 
@@ -101,3 +101,9 @@ def test_seeds_stand_in_one_row_whose_interval_has_both_spreads():
     assert 0.75 < row.mean.high <= 0.81
     one = compare_families(entries[:1], still)[0]
     assert one.mean.high - one.mean.low < 0.003
+
+
+@pytest.mark.parametrize("name", ["PPO", "PPO, seed 3", "PPO, 5 seeds"])
+def test_a_family_is_the_name_without_seeds(name):
+    assert family(name) == "PPO"
+    assert family("feed-forward + feedback (state)") == "feed-forward + feedback (state)"

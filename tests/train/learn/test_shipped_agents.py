@@ -52,7 +52,7 @@ def test_all_seeds_are_there():
 @pytest.mark.parametrize("spec", POLICIES, ids=lambda spec: spec.name)
 def test_a_policy_meets_the_committed_figures(spec):
     config, scenarios = TaskConfig(), held_out_scenarios(ScenarioDistribution(), SCENARIOS)
-    policy = spec.build(BuildContext(scenarios=scenarios, nominal=ScenarioDistribution().nominal(), config=config))
+    policy = spec.build(BuildContext(scenarios=scenarios, config=config))
     found = run(policy, scenarios, config.replaced(observation=observation_of(policy, config)))
     want = committed()[spec.name]
     assert len(want) == SCENARIOS
