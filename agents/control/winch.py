@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,10 @@ from aframe_env.dynamics.winch import drum_state, plan
 from aframe_env.scenario.crane import Crane
 from agents.control.filters import ALL, FloatArray, Rows
 
-_BISECTIONS = 48  # a hair of the speed range: below 1e-13 rad/s
+_TURN: Final = 0
+_SPEED: Final = 1
+
+_BISECTIONS: Final = 48  # a hair of the speed range: below 1e-13 rad/s
 
 
 class WinchModel:
@@ -82,18 +85,26 @@ def _advance(command: float, speed: float, acceleration: float, lag: float, peri
 
 
 @scalar
-def command_for(turn: float, speed: float, limit: float, acceleration: float, lag: float, period: float) -> float:
-    """Find the command [rad/s] within ± ``limit`` that turns the drum by ``turn`` [rad] in a control step, if any."""
+def _bisect(
+    wanted: float, quantity: int, speed: float, limit: float, acceleration: float, lag: float, period: float
+) -> float:
+    """Find the command [rad/s] within ± ``limit`` after which the turn or the speed is as ``wanted``, or nearly so."""
     low, high = -limit, limit
     middle = 0.0
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        angle, _speed = _advance(middle, speed, acceleration, lag, period)
-        if angle < turn:
+        turn, reached = _advance(middle, speed, acceleration, lag, period)
+        if (turn if quantity == _TURN else reached) < wanted:
             low = middle
         else:
             high = middle
     return middle
+
+
+@scalar
+def command_for(turn: float, speed: float, limit: float, acceleration: float, lag: float, period: float) -> float:
+    """Find the command [rad/s] within ± ``limit`` that turns the drum by ``turn`` [rad] in a control step, if any."""
+    return _bisect(turn, _TURN, speed, limit, acceleration, lag, period)
 
 
 @scalar
@@ -103,16 +114,7 @@ def command_to_reach(
     """Find the command [rad/s] within ± ``limit`` after which the drum turns at ``wanted`` [rad/s], or nearly so."""
     if lag == 0.0:
         return min(max(wanted, -limit), limit)
-    low, high = -limit, limit
-    middle = 0.0
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        _angle, reached = _advance(middle, speed, acceleration, lag, period)
-        if reached < wanted:
-            low = middle
-        else:
-            high = middle
-    return middle
+    return _bisect(wanted, _SPEED, speed, limit, acceleration, lag, period)
 
 
 @cache
