@@ -2,11 +2,11 @@
 
 For a trajectory of n control steps, find the changes w_k of its inputs that make
 
-    Σ c_end (e_k+1 + x_k+1[0])² + c_mid (m_k + middle · x_k + β_k w_k)² + ρ w_k²
+    Σ c_end (e_k+1 + x_k+1[0])² + c_mid (m_k + middle · x_k + β_k w_k)² + ρ w_k²  +  (x̄ + x_n)ᵀ P (x̄ + x_n)
 
-least, where x_k+1 = A x_k + b_k w_k, x_0 = 0, with |u_k + w_k| ≤ U and |v_k + x_k+1[3]| ≤ V: e and m are the nominal
-errors at the ends and in the middles of the steps, u the nominal inputs, v the nominal values of the limited state, and
-ρ keeps the change short. Mehrotra's predictor and corrector (SIAM J. Optim. 2, 1992); the normal equations are banded,
+least, where x_k+1 = A x_k + b_k w_k, x_0 = 0, with |u_k + w_k| ≤ U_k and |v_k + x_k+1[3]| ≤ V: e and m are the nominal
+errors at the ends and in the middles of the steps, u the nominal inputs, v the nominal values of the limited state,
+x̄ the nominal last state, and ρ keeps the change short. Mehrotra's predictor and corrector (SIAM J. Optim. 2, 1992); the normal equations are banded,
 and a backward and a forward pass solve them (Rao, Wright and Rawlings, J. Optim. Theory Appl. 99, 1998): the time grows
 with n only. All problems of a batch are solved side by side over the cores.
 """
@@ -14,7 +14,7 @@ with n only. All problems of a batch are solved side by side over the cores.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Any, Final
 
@@ -59,14 +59,26 @@ class BoundedTracking:
     state: FloatArray
     """(N, n) v."""
     input_limit: FloatArray
-    """(N,) U."""
+    """(N, n) U."""
     state_limit: FloatArray
     """(N,) V."""
+    last_state: FloatArray | None = None
+    """(N, 4) x̄; None where the last state costs nothing."""
+    cost_to_go: FloatArray | None = None
+    """(N, 4, 4) P."""
+
+    def rows(self, which: npt.NDArray[np.int64]) -> BoundedTracking:
+        """The problems of some rows."""
+        chosen = {each.name: getattr(self, each.name) for each in fields(self)}
+        return replace(self, **{k: v[which] for k, v in chosen.items() if isinstance(v, np.ndarray)})
 
     def solve(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Changes w (N, n) of the inputs, and how many iterations each problem took."""
         change = np.zeros_like(self.inputs)
         iterations = np.zeros(len(change), dtype=np.int64)
+        count = len(change)
+        last_state = np.zeros((count, STATES)) if self.last_state is None else self.last_state
+        cost_to_go = np.zeros((count, STATES, STATES)) if self.cost_to_go is None else self.cost_to_go
         _kernel()(
             self.a,
             self.b,
@@ -79,6 +91,8 @@ class BoundedTracking:
             self.state,
             self.input_limit,
             self.state_limit,
+            last_state,
+            cost_to_go,
             change,
             iterations,
         )
@@ -86,11 +100,16 @@ class BoundedTracking:
 
 
 @scalar
-def _factorise(a: Any, b: Any, middle: Any, beta: Any, weights: Any, barrier: Any, gain: Any, inverse: Any) -> None:
+def _factorise(
+    a: Any, b: Any, middle: Any, beta: Any, weights: Any, cost_to_go: Any, barrier: Any, gain: Any, inverse: Any
+) -> None:
     """Backward pass: feedback gains (n, 4) and inverses of the inputs' curvatures (n,) with the barrier's (n, 2)."""
     end, mid, rho = weights[0], weights[1], weights[2]
     p, closed, pc = np.zeros((STATES, STATES)), np.zeros((STATES, STATES)), np.zeros((STATES, STATES))
     pb, seen = np.zeros(STATES), np.zeros(STATES)
+    for i in range(STATES):
+        for j in range(STATES):
+            p[i, j] = 2.0 * cost_to_go[i, j]
     for k in range(b.shape[0] - 1, -1, -1):
         p[0, 0] += 2.0 * end
         p[3, 3] += barrier[k, 1]
@@ -135,6 +154,8 @@ def _newton_step(
     error: Any,
     error_middle: Any,
     weights: Any,
+    last_state: Any,
+    cost_to_go: Any,
     x: Any,
     w: Any,
     push: Any,
@@ -150,6 +171,9 @@ def _newton_step(
     """
     end, mid, rho = weights[0], weights[1], weights[2]
     costate, before = np.zeros(STATES), np.zeros(STATES)
+    for i in range(STATES):
+        for j in range(STATES):
+            costate[i] += 2.0 * cost_to_go[i, j] * (last_state[j] + x[b.shape[0], j])
     for k in range(b.shape[0] - 1, -1, -1):
         costate[0] += 2.0 * end * (error[k] + x[k + 1, 0])
         costate[3] += push[k, 1]
@@ -188,8 +212,10 @@ def _solve(
     weights: Any,
     u: Any,
     v: Any,
-    u_limit: float,
+    u_limit: Any,
     v_limit: float,
+    last_state: Any,
+    cost_to_go: Any,
     w: Any,
 ) -> int:
     """Solve one problem into ``w`` (n,); return the number of iterations."""
@@ -203,10 +229,13 @@ def _solve(
     cost = 0.0
     for k in range(n):
         cost += weights[0] * error[k] * error[k] + weights[1] * error_middle[k] * error_middle[k]
+    for i in range(STATES):
+        for j in range(STATES):
+            cost += last_state[i] * cost_to_go[i, j] * last_state[j]
     start = 0.1 * max(cost / n, 1e-12)
     for k in range(n):
-        slack[k, 0] = max(u[k] + u_limit, 0.1 * u_limit)
-        slack[k, 1] = max(u_limit - u[k], 0.1 * u_limit)
+        slack[k, 0] = max(u[k] + u_limit[k], 0.1 * u_limit[k])
+        slack[k, 1] = max(u_limit[k] - u[k], 0.1 * u_limit[k])
         slack[k, 2] = max(v[k] + v_limit, 0.04 * v_limit)
         slack[k, 3] = max(v_limit - v[k], 0.04 * v_limit)
         for i in range(LIMITS):
@@ -216,8 +245,8 @@ def _solve(
     for iteration in range(MAX_ITERATIONS):
         gap, worst = 0.0, 0.0
         for k in range(n):
-            residual[k, 0] = u[k] + w[k] + u_limit - slack[k, 0]
-            residual[k, 1] = u_limit - u[k] - w[k] - slack[k, 1]
+            residual[k, 0] = u[k] + w[k] + u_limit[k] - slack[k, 0]
+            residual[k, 1] = u_limit[k] - u[k] - w[k] - slack[k, 1]
             residual[k, 2] = v[k] + x[k + 1, 3] + v_limit - slack[k, 2]
             residual[k, 3] = v_limit - v[k] - x[k + 1, 3] - slack[k, 3]
             for i in range(LIMITS):
@@ -227,7 +256,7 @@ def _solve(
             barrier[k, 1] = dual[k, 2] / slack[k, 2] + dual[k, 3] / slack[k, 3]
         if gap < TOLERANCE * cost + 1e-14 and worst < 1e-9 and unbalanced < TOLERANCE:
             return iteration
-        _factorise(a, b, middle, beta, weights, barrier, gain, inverse)
+        _factorise(a, b, middle, beta, weights, cost_to_go, barrier, gain, inverse)
         target = 0.0
         for phase in range(2):
             for k in range(n):
@@ -237,7 +266,25 @@ def _solve(
                 push[k, 0] -= (dual[k, 1] * residual[k, 1] - corrector[k, 1]) / slack[k, 1]
                 push[k, 1] = (dual[k, 2] * residual[k, 2] - corrector[k, 2]) / slack[k, 2]
                 push[k, 1] -= (dual[k, 3] * residual[k, 3] - corrector[k, 3]) / slack[k, 3]
-            _newton_step(a, b, middle, beta, error, error_middle, weights, x, w, push, gain, inverse, feed, dx, dw)
+            _newton_step(
+                a,
+                b,
+                middle,
+                beta,
+                error,
+                error_middle,
+                weights,
+                last_state,
+                cost_to_go,
+                x,
+                w,
+                push,
+                gain,
+                inverse,
+                feed,
+                dx,
+                dw,
+            )
             primal, adjoint = 1.0, 1.0
             for k in range(n):
                 dslack[k, 0] = dw[k] + residual[k, 0]
@@ -272,7 +319,21 @@ def _solve(
 def _kernel() -> Callable[..., None]:
     @parallel_kernel
     def solve(  # type: ignore[no-untyped-def]
-        a, b, middle, beta, error, error_middle, weights, u, v, u_limit, v_limit, change, iterations
+        a,
+        b,
+        middle,
+        beta,
+        error,
+        error_middle,
+        weights,
+        u,
+        v,
+        u_limit,
+        v_limit,
+        last_state,
+        cost_to_go,
+        change,
+        iterations,
     ):
         for i in prange(b.shape[0]):
             iterations[i] = _solve(
@@ -287,6 +348,8 @@ def _kernel() -> Callable[..., None]:
                 v[i],
                 u_limit[i],
                 v_limit[i],
+                last_state[i],
+                cost_to_go[i],
                 change[i],
             )
 

@@ -9,14 +9,23 @@ it bobs on its rope.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from aframe_env.scenario.sensors import Sensors
 from agents.control.filters import ALL, FloatArray, Rows
+from agents.control.expected_waves import ExpectedWaves
 from agents.control.rope import RopeModel
+
+LEAST_RATE_NOISE: Final = 0.001
+"""Least standard deviation of a reading of the heave rate that is reckoned with, m/s."""
+LEAST_DEPTH_NOISE: Final = 0.001
+"""And of the depth, m."""
 
 ComplexArray = npt.NDArray[np.complex128]
 
@@ -25,23 +34,28 @@ ComplexArray = npt.NDArray[np.complex128]
 class WaveBank:
     """Oscillators of the filter, and its noise model."""
 
-    lowest: float = 0.3
-    """rad/s."""
-    highest: float = 1.6
-    """rad/s."""
-    bands: int = 40
+    waves: ExpectedWaves
+    """What the pulley's motion is expected to be: the oscillators' frequencies, their shares of it, its build-up."""
+    rate_noise: float
+    """Standard deviation of a reading of the heave rate, m/s."""
+    depth_noise: float
+    """Standard deviation of a reading of the depth, m."""
     damping: float = 0.002
     """Rate at which an oscillator forgets, 1/s."""
-    variance: float = 0.06
-    """Variance of the heave rate, spread evenly over the bands, m²/s²."""
-    build_up: float = 10.0
-    """Time over which the motion comes up to that variance at the start of a lift, s."""
-    rate_noise: float = 0.01
-    """Standard deviation of a reading of the heave rate, m/s."""
-    depth_noise: float = 0.06
-    """Standard deviation of a reading of the depth, m."""
     offset_drift: float = 1e-7
     """Variance by which the offset between heave and depth grows, m²/s."""
+
+    @classmethod
+    def of(cls, waves: ExpectedWaves, sensors: Sensors | None) -> WaveBank:
+        """Bank for readings of these sensors; None for exact ones."""
+        if sensors is None:
+            return cls(waves=waves, rate_noise=LEAST_RATE_NOISE, depth_noise=LEAST_DEPTH_NOISE)
+        rate, depth = sensors.heave_rate, sensors.depth_error
+        return cls(
+            waves=waves,
+            rate_noise=max(LEAST_RATE_NOISE, math.hypot(rate.noise, rate.resolution / math.sqrt(12.0))),
+            depth_noise=max(LEAST_DEPTH_NOISE, math.hypot(depth.noise, depth.resolution / math.sqrt(12.0))),
+        )
 
 
 @dataclass(frozen=True)
@@ -63,22 +77,24 @@ class Schedule:
 
 @cache
 def schedule(bank: WaveBank, period: float, hold: int) -> Schedule:
-    """Gains of the Kalman filter for a ship at rest at the start, by the recursion of its covariance over 60 s."""
+    """Gains of the Kalman filter by the recursion of its covariance over 60 s."""
     steps = hold * round(60.0 / period / hold) + hold
     exponent = _exponents(bank)
+    bands, build_up = len(exponent), bank.waves.build_up
     transition = np.append(np.exp(exponent * period), 1.0)[:, None]
-    rate = np.append(np.tile([1.0, 0.0], bank.bands), 0.0)
+    rate = np.append(np.tile([1.0, 0.0], bands), 0.0)
     inverse = 1.0 / exponent
     depth = np.append(np.stack([inverse.real, -inverse.imag], axis=1).ravel(), 1.0)
-    moving = np.arange(0, 2 * bank.bands, 2)  # it is the rates that are stirred: a displacement does not jump
-    share = bank.variance / bank.bands
-    covariance = np.diag(np.append(np.zeros(2 * bank.bands), 1e-6))
-    gains = np.zeros((2, steps, 2 * bank.bands + 1))
+    moving = np.arange(0, 2 * bands, 2)  # it is the rates that are stirred: a displacement does not jump
+    variance = np.array(bank.waves.variance)
+    # A ship that moves already has all of it, in both parts of every oscillator.
+    covariance = np.diag(np.append(np.zeros(2 * bands) if build_up else np.repeat(variance, 2), 1e-6))
+    gains = np.zeros((2, steps, 2 * bands + 1))
     for step in range(1, steps):
         covariance = _propagated(transition, _propagated(transition, covariance).T)
-        rising = step * period < bank.build_up
-        grow = 2.0 * period / bank.build_up if rising else -np.expm1(-2.0 * bank.damping * period)
-        covariance[moving, moving] += 2.0 * share * grow
+        rising = step * period < build_up
+        grow = 2.0 * period / build_up if rising else -np.expm1(-2.0 * bank.damping * period)
+        covariance[moving, moving] += 2.0 * variance * grow
         covariance[-1, -1] += bank.offset_drift * period
         for kind, row, noise in ((0, rate, bank.rate_noise), (1, depth, bank.depth_noise)):
             if kind == 0 or step % hold == 0:
@@ -101,33 +117,36 @@ def _propagated(transition: ComplexArray, columns: FloatArray) -> FloatArray:
 
 
 def _exponents(bank: WaveBank) -> ComplexArray:
-    return np.asarray(-bank.damping + 1j * np.linspace(bank.lowest, bank.highest, bank.bands), dtype=np.complex128)
+    return np.asarray(-bank.damping + 1j * np.array(bank.waves.frequency), dtype=np.complex128)
 
 
 class WaveFilter:
     """Estimate and prediction of the pulley's heave, for N rows."""
 
-    def __init__(self, rows: int, control_period: float, hold: int, bank: WaveBank | None = None) -> None:
+    def __init__(self, rows: int, control_period: float, hold: int, bank: WaveBank) -> None:
         """``hold``: control steps between two readings of the depth."""
-        bank = bank or WaveBank()
         self._schedule = schedule(bank, control_period, hold)
         self._exponent = _exponents(bank)
         self._transition = np.append(np.exp(self._exponent * control_period), 1.0)
-        self._state = np.zeros((rows, bank.bands + 1), dtype=np.complex128)
+        self._state = np.zeros((rows, len(self._exponent) + 1), dtype=np.complex128)
         """The heave rate is the sum of the real parts of all but the last, m/s; the last is the offset, m."""
         self._step = np.zeros(rows, dtype=np.int64)
+        self._factors: dict[tuple[bytes, bytes, float], ComplexArray] = {}
+        self.innovation = np.zeros(rows)
+        """Latest reading of the heave rate less what was foretold of it, (N,) m/s."""
 
     def start(self, rows: Rows = ALL) -> None:
         """Begin in these rows with a ship at rest."""
         self._state[rows] = 0.0
         self._step[rows] = 0
+        self.innovation[rows] = 0.0
 
     def advance(self, heave_rate: FloatArray) -> None:
         """Take a reading (N,) m/s of the pulley's heave rate, a control step later."""
         self._step += 1
         self._state *= self._transition
-        innovation = heave_rate - self._state[:, :-1].real.sum(axis=1)
-        self._state += innovation[:, None] * self._schedule.rate[self._schedule.index(self._step)]
+        self.innovation = heave_rate - self._state[:, :-1].real.sum(axis=1)
+        self._state += self.innovation[:, None] * self._schedule.rate[self._schedule.index(self._step)]
 
     def correct(self, innovation: FloatArray) -> None:
         """Take the innovation (N,) m of the depth; it counts in the steps that have a reading."""
@@ -157,6 +176,25 @@ class WaveFilter:
         """Rise (T, N) m of the pulley since that moment."""
         return self._sum(np.expm1(np.outer(times, self._exponent)) / self._exponent)
 
+    def foretold(self, ahead: FloatArray, rises: FloatArray, rows: Rows = ALL, delay: float = 0.0) -> FloatArray:
+        """Velocities (A, n) m/s of the pulley ``ahead`` (A,) s from now, and its rises (R, n) m by ``rises`` (R,) s.
+
+        Now is ``delay`` s after the latest reading's moment of measurement; the two are one array (A + R, n).
+        """
+        factors = self._foretelling(ahead.tobytes(), rises.tobytes(), delay)
+        # As real numbers in one product. A row's sum does not depend on the others: each is a sum of its own.
+        state = self._state[rows, :-1]
+        return np.einsum("fb,nb->fn", factors.real, state.real) - np.einsum("fb,nb->fn", factors.imag, state.imag)
+
+    def _foretelling(self, ahead: bytes, rises: bytes, delay: float) -> ComplexArray:
+        key = (ahead, rises, delay)
+        if key not in self._factors:
+            now = np.exp(self._exponent * delay)
+            rate = np.exp(np.outer(np.frombuffer(ahead), self._exponent))
+            rise = np.expm1(np.outer(np.frombuffer(rises), self._exponent)) / self._exponent
+            self._factors[key] = np.concatenate([rate, rise]) * now
+        return self._factors[key]
+
     def _sum(self, factors: ComplexArray) -> FloatArray:
         # Row by row in the same order, whatever the batch: a sum, not a matrix product.
         return np.asarray((factors[:, None, :] * self._state[None, :, :-1]).real.sum(axis=2))
@@ -167,27 +205,31 @@ ACCELERATION_NOISE = 0.02
 
 
 class RopeFilter:
-    """The load on its rope, x = (e, v, q) of N rows: depth error, its rate, and where the rope's end would hold it.
+    """The load on its rope, x = (e, v, q, b) of N rows: depth error, its rate, where the rope's end would hold it, bias.
 
-    Only e - q and v are of use: q is dead-reckoned and drifts.
+    Only e - q and v are of use: q is dead-reckoned and drifts. The bias b is that of a reading of the stretch: the
+    load's weight is what the first reading of the tension said, noise and all.
     """
 
     def __init__(self, rows: int, rate_noise: float) -> None:
         """``rate_noise``: standard deviation of a reading of the heave rate, m/s."""
         self._rate_noise = rate_noise
-        self._a, self._b = np.zeros((rows, 3, 3)), np.zeros((rows, 3))
-        self._process_noise, self._covariance = np.zeros((rows, 3, 3)), np.zeros((rows, 3, 3))
+        self._a, self._b = np.zeros((rows, 4, 4)), np.zeros((rows, 4))
+        self._process_noise, self._covariance = np.zeros((rows, 4, 4)), np.zeros((rows, 4, 4))
         self._noise = np.ones(rows)
-        self._x = np.zeros((rows, 3))
+        self._x = np.zeros((rows, 4))
 
     def start(self, model: RopeModel, period: float, stretch_noise: FloatArray, rows: Rows = ALL) -> None:
         """Begin in these rows with loads at rest; ``stretch_noise`` (n,) of a reading of the stretch, m."""
-        self._a[rows], self._b[rows] = model.a[:, :3, :3], model.b[:, :3]
-        b = model.b[:, :3]
+        a, b = np.zeros((len(stretch_noise), 4, 4)), np.zeros((len(stretch_noise), 4))
+        a[:, :3, :3], a[:, 3, 3] = model.a[:, :3, :3], 1.0
+        b[:, :3] = model.b[:, :3]
         process_noise = self._rate_noise**2 * b[:, :, None] * b[:, None, :]
         process_noise[:, 1, 1] += (ACCELERATION_NOISE * period) ** 2
-        self._process_noise[rows] = process_noise
-        self._covariance[rows] = 1e-4 * np.eye(3)
+        self._a[rows], self._b[rows], self._process_noise[rows] = a, b, process_noise
+        covariance = np.tile(np.diag([1e-4, 1e-4, 1e-4, 0.0]), (len(stretch_noise), 1, 1))
+        covariance[:, 3, 3] = stretch_noise**2
+        self._covariance[rows] = covariance
         self._noise[rows] = stretch_noise**2
         self._x[rows] = 0.0
 
@@ -196,9 +238,10 @@ class RopeFilter:
         a = self._a
         x = (a @ self._x[:, :, None])[:, :, 0] + self._b * speed[:, None]
         p = a @ self._covariance @ a.transpose(0, 2, 1) + self._process_noise
-        cross_covariance = p[:, :, 2] - p[:, :, 0]
-        gain = cross_covariance / (cross_covariance[:, 2] - cross_covariance[:, 0] + self._noise)[:, None]
-        self._x = x + gain * (stretch - (x[:, 2] - x[:, 0]))[:, None]
+        cross_covariance = p[:, :, 2] - p[:, :, 0] + p[:, :, 3]
+        seen = cross_covariance[:, 2] - cross_covariance[:, 0] + cross_covariance[:, 3]
+        gain = cross_covariance / (seen + self._noise)[:, None]
+        self._x = x + gain * (stretch - (x[:, 2] - x[:, 0] + x[:, 3]))[:, None]
         self._covariance = p - gain[:, :, None] * cross_covariance[:, None, :]
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 
 from aframe_env.scenario.crane import GRAVITY
 from aframe_env.scenario.sensors import Sensors
+from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import ALL, DRUM_RADIUS, Estimator, FloatArray, Readings, Rows
 from agents.control.kalman import RopeFilter, WaveBank, WaveFilter
 from agents.control.regulator import Columns, HoistBatch
@@ -128,21 +129,22 @@ class PolynomialObserver(Observer):
 class KalmanObserver(Observer):
     """Kalman filters of the pulley, as a bank of waves, and of the load, bobbing on its rope."""
 
-    def __init__(self, hoists: HoistBatch, damping_ratio: float, sensors: Sensors) -> None:
-        """``sensors``: delay and noise that the filters are designed for."""
+    def __init__(self, hoists: HoistBatch, damping_ratio: float, sensors: Sensors, waves: ExpectedWaves) -> None:
+        """``sensors`` and ``waves``: delay, noise and motion that the filters are designed for."""
         super().__init__(hoists, damping_ratio, sensors.delay)
         rows, hold = len(hoists.frequency), max(1, round(sensors.depth_error.period / hoists.period))
+        bank = WaveBank.of(waves, sensors)
         self._tension = sensors.tension
-        self._waves = WaveFilter(rows, hoists.period, hold)
-        self._rope = RopeFilter(rows, WaveBank().rate_noise)
+        self.waves = WaveFilter(rows, hoists.period, hold, bank)
+        self._rope = RopeFilter(rows, bank.rate_noise)
         self._heave_rate, self._drum_angle, self._first_angle, self._depth_error = np.zeros((4, rows))
 
     def _start(self, o: Columns, rows: Rows) -> None:
         hoists, tension = self._hoists, self._tension
-        noise = np.maximum(tension.noise, tension.relative_noise * o["load_mass"] * GRAVITY)
+        noise = np.maximum(tension.noise, tension.relative_noise * hoists.mass[rows] * GRAVITY)
         model = hoists.model(self._damping_ratio, rows)
         self._rope.start(model, hoists.period, hoists.stretch_under(noise, o, rows), rows)
-        self._waves.start(rows)
+        self.waves.start(rows)
         self._heave_rate[rows], self._drum_angle[rows] = o["pulley_velocity_z"], o["drum_angle"]
         self._first_angle[rows], self._depth_error[rows] = o["drum_angle"], 0.0
 
@@ -151,17 +153,17 @@ class KalmanObserver(Observer):
         paid_out = radius * (drum_angle - self._drum_angle)
         speed = 0.5 * (heave_rate + self._heave_rate) - paid_out / self._hoists.period
         self._heave_rate, self._drum_angle = heave_rate, drum_angle
-        self._waves.advance(heave_rate)
+        self.waves.advance(heave_rate)
         self._rope.advance(speed, self._hoists.stretch(o))
         below = radius * (drum_angle - self._first_angle) + self._rope.stretch
-        self._waves.correct(o["depth_error"] - self._waves.heave() + below)
-        self._depth_error = self._waves.heave() - below
+        self.waves.correct(o["depth_error"] - self.waves.heave() + below)
+        self._depth_error = self.waves.heave() - below
 
     def _load(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         return self._depth_error, self._rope.load_velocity, self._rope.stretch
 
     def _path(self, times: FloatArray) -> FloatArray:
-        return self._waves.path(times)
+        return self.waves.path(times)
 
     def _rate(self, times: FloatArray) -> FloatArray:
-        return self._waves.rate(times)
+        return self.waves.rate(times)

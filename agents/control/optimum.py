@@ -236,7 +236,7 @@ def _gauss_newton(
         weights=(period / 3.0, 2.0 * period / 3.0, PROXIMITY),
         inputs=change,
         state=speed,
-        input_limit=most,
+        input_limit=np.repeat(most[:, None], change.shape[1], axis=1),
         state_limit=np.array([scenario.crane.winch.max_rope_speed for scenario in scenarios]),
     )
     return np.asarray(np.cumsum(problem.solve()[0], axis=1))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +18,8 @@ from agents.control.rope import RopeModel
 from agents.control.winch import WinchModel
 
 Observation = npt.NDArray[np.float32]
+LEAST_WEIGHT: Final = 1.0
+"""Least weight of a load, N: a reading of nothing stands for that."""
 Columns = dict[str, FloatArray]
 """An observation by the names of its quantities, each (N,)."""
 
@@ -55,12 +59,28 @@ class Regulator:
 
     def speed(self, z: FloatArray) -> FloatArray:
         """Speed (N,) m/s that the rope's end should have during the control step, from the state z (N, 4)."""
-        e, v, q, p = z.T
-        ke, kv, kq, kp = self.k.T
-        goal = np.clip((ke * (q - e) + kv * (p - v)) / (ke + kq), -self.amplitude, self.amplitude)
-        wanted = (ke + kq) / (kv + kp) * (goal - q)
-        braking = np.sqrt(2.0 * self.acceleration * abs(goal - q))
-        return np.asarray(p + (kv + kp) * (np.clip(wanted, -braking, braking) - p))
+        return np.asarray(regulated_speed(np, self.k.T, self.amplitude, self.acceleration, z.T))
+
+
+def regulated_speed(xp: Any, k: Any, amplitude: Any, acceleration: Any, z: Any) -> Any:
+    """``Regulator.speed`` with gains k (4, N) and state z (4, N), arrays of ``xp`` = numpy or torch."""
+    e, v, q, p = z
+    ke, kv, kq, kp = k
+    goal = xp.clip((ke * (q - e) + kv * (p - v)) / (ke + kq), -amplitude, amplitude)
+    wanted = (ke + kq) / (kv + kp) * (goal - q)
+    # Not quite zero: the slope of a square root is endless there, and learning goes along it.
+    braking = xp.sqrt(2.0 * acceleration * xp.clip(abs(goal - q), 1e-9, None))
+    return p + (kv + kp) * (xp.clip(wanted, -braking, braking) - p)
+
+
+GRID: Final = np.geomspace(0.05, 60.0, 512)
+"""Frequencies of the loads' bobbing that gains are tabled for, rad/s."""
+
+
+@cache
+def gain_table(damping_ratio: float, effort: float, period: float) -> FloatArray:
+    """Gains (4, GRID) of the linear-quadratic regulator at the frequencies of ``GRID``."""
+    return RopeModel.of(GRID, damping_ratio, period).gains(effort).T.copy()
 
 
 class HoistBatch:
@@ -70,16 +90,21 @@ class HoistBatch:
         self.period = control_period
         self.winch = WinchModel(rows, control_period)
         self._columns = {q.name: i for i, q in enumerate(quantities)}
-        self._axial_stiffness, self._weight, self.frequency = np.ones((3, rows))
-        """``frequency``: of the loads' bobbing on their ropes, (N,) rad/s."""
+        self._axial_stiffness, self._weight, self.mass, self.frequency = np.ones((4, rows))
+        """``mass`` of the loads, (N,) kg, as they were weighed; ``frequency`` of their bobbing on the ropes, rad/s."""
 
     def start(self, cranes: Sequence[Crane], observation: Observation, rows: Rows = ALL) -> Columns:
-        """Begin hoists with these cranes in these rows; return the first observation (n, K) by its names."""
+        """Begin hoists with these cranes in these rows; return the first observation (n, K) by its names.
+
+        The loads are weighed: a lift begins with the load hanging still on its rope, and what the tension reads then is
+        its weight, whatever mass was told.
+        """
         self.winch.start(cranes, rows)
         o = self.columns(observation)
         self._axial_stiffness[rows] = [crane.rope.axial_stiffness for crane in cranes]
-        self._weight[rows] = o["load_mass"] * GRAVITY
-        self.frequency[rows] = np.sqrt(self._axial_stiffness[rows] / (o["rope_length"] * o["load_mass"]))
+        self._weight[rows] = np.maximum(o["rope_tension"], LEAST_WEIGHT)
+        self.mass[rows] = self._weight[rows] / GRAVITY
+        self.frequency[rows] = np.sqrt(self._axial_stiffness[rows] / (o["rope_length"] * self.mass[rows]))
         return o
 
     def columns(self, observation: Observation) -> Columns:

@@ -1,0 +1,135 @@
+"""Waves that a task lets expect: the mean spectrum of the pulley's heave rate over the scenarios it draws.
+
+A filter of the motion needs to know how much of it lies at which frequency, and how fast it comes up at the start of a
+lift. That is the statistics of the sea at hand, never the waves of an episode: other scenarios are drawn for it than
+any that is trained on or evaluated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from aframe_env.scenario import Scenario, ScenarioSource
+from aframe_env.scenario.motion import Coordinate, has_components, is_tabled
+from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
+from aframe_env.scenario.sea import SeaMotion
+from aframe_env.validation import InvalidValue, require_number
+from agents.control.filters import FloatArray
+
+SEED: Final = 3_000_017
+"""Seed of the scenarios that the spectrum is the mean of."""
+SCENARIOS: Final = 512
+BANDS: Final = 48
+"""Bands of frequency that the spectrum is told in."""
+OUTSIDE: Final = 2e-3
+"""Share of the variance that may lie below the lowest band, and above the highest."""
+FLOOR: Final = 1e-4
+"""Least variance of a band, as a share of the bands' mean."""
+LEAST_VARIANCE: Final = 1e-6
+"""Least variance in all, m²/s²: of a ship at rest."""
+WIDEST: Final = (0.2, 2.5)
+"""rad/s: the bands lie within; what moves faster is no ship, what moves slower is no wave."""
+LEAST_WIDTH: Final = 0.3
+"""Least width from the lowest band to the highest, rad/s."""
+_SAMPLING: Final = 0.25  # s, of recorded motions
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExpectedWaves:
+    """Bands of the pulley's heave rate."""
+
+    frequency: tuple[float, ...]
+    """Middle of each band, rad/s, increasing."""
+    variance: tuple[float, ...]
+    """Variance of the heave rate in each band, m²/s²."""
+    build_up: float
+    """Time over which the motion comes up to that at the start of a lift, s; 0 for a ship that moves already."""
+
+    def __post_init__(self) -> None:
+        if not len(self.frequency) == len(self.variance) > 1:
+            raise InvalidValue(
+                f"{len(self.frequency)} frequencies and {len(self.variance)} variances of waves: "
+                "must be as many, and two at least"
+            )
+        for value in self.frequency:
+            require_number("frequency", value, "rad/s", low=0.0, high=100.0, low_open=True)
+        for value in self.variance:
+            require_number("variance", value, "m²/s²", low=0.0, high=1e4, low_open=True)
+        require_number("build_up", self.build_up, "s", low=0.0, high=1e4)
+
+    @classmethod
+    def of(cls, source: ScenarioSource) -> ExpectedWaves:
+        """Waves that the scenarios of a source let expect; of a single scenario, other realisations of its sea."""
+        return _expected(source)
+
+
+@lru_cache(maxsize=32)
+def _expected(source: ScenarioSource) -> ExpectedWaves:
+    rng = np.random.default_rng(SEED)
+    if isinstance(source, Scenario):
+        scenarios = [_another(source, seed) for seed in rng.integers(2**53, size=SCENARIOS).tolist()]
+    else:
+        scenarios = [source.draw(rng) for _ in range(SCENARIOS)]
+    lines = list(_spectra(scenarios))
+    frequency, variance = np.concatenate([line[0] for line in lines]), np.concatenate([line[1] for line in lines])
+    variance = variance / len(scenarios)
+    low, high = _band(frequency, variance)
+    middle = np.linspace(low, high, BANDS)
+    edges = np.concatenate([[-math.inf], 0.5 * (middle[1:] + middle[:-1]), [math.inf]])
+    inside = np.histogram(frequency, edges, weights=variance)[0]
+    # Smoothed over neighbours: a mean over a few hundred seas still has teeth.
+    padded = np.pad(inside, 1, mode="edge")
+    smooth = 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
+    total = max(float(smooth.sum()), LEAST_VARIANCE)
+    floored = np.maximum(smooth, FLOOR * total / BANDS)
+    return ExpectedWaves(
+        frequency=tuple(middle.tolist()), variance=tuple(floored.tolist()), build_up=float(scenarios[0].ramp)
+    )
+
+
+def _another(scenario: Scenario, seed: int) -> Scenario:
+    """The scenario in another realisation of its sea; a motion that is no sea stays as it is."""
+    if not isinstance(scenario.motion, SeaMotion):
+        return scenario
+    return replace(scenario, motion=replace(scenario.motion, sea=replace(scenario.motion.sea, seed=seed)))
+
+
+def _spectra(scenarios: Iterable[Scenario]) -> Iterable[tuple[FloatArray, FloatArray]]:
+    """Frequencies (K,) rad/s and variances (K,) m²/s² of the pulley's heave rate in each scenario."""
+    for scenario in scenarios:
+        x, y, _ = scenario.crane.pulley_position
+        motion = scenario.motion
+        if has_components(motion):
+            components = motion.components()
+            q = components.response
+            heave = q[:, Coordinate.HEAVE] + y * q[:, Coordinate.ROLL] - x * q[:, Coordinate.PITCH]
+            yield components.frequency, 0.5 * np.square(np.abs(heave) * components.frequency)
+        else:
+            assert is_tabled(motion)
+            yield _recorded(motion.table(_SAMPLING)[:, 6:12], x, y)
+
+
+def _recorded(rates: FloatArray, x: float, y: float) -> tuple[FloatArray, FloatArray]:
+    """Spectrum of a record: of the pulley's heave rate, from the deck's ``rates`` (T, 6)."""
+    signal = rates[:, Coordinate.HEAVE] + y * rates[:, Coordinate.ROLL] - x * rates[:, Coordinate.PITCH]
+    window = np.hanning(len(signal))
+    spectrum = np.fft.rfft(window * (signal - signal.mean()))
+    power = 2.0 * np.square(np.abs(spectrum)) / (len(signal) * np.square(window).sum())
+    return 2.0 * np.pi * np.fft.rfftfreq(len(signal), _SAMPLING), power
+
+
+def _band(frequency: FloatArray, variance: FloatArray) -> tuple[float, float]:
+    """Lowest and highest frequency [rad/s] of note."""
+    order = np.argsort(frequency)
+    mass = np.cumsum(variance[order])
+    if mass[-1] <= 0.0:
+        return 0.3, 1.6
+    low, high = frequency[order][np.searchsorted(mass, mass[-1] * np.array([OUTSIDE, 1.0 - OUTSIDE]))].tolist()
+    middle, half = 0.5 * (low + high), max(0.5 * (high - low), 0.5 * LEAST_WIDTH)
+    return max(middle - half, WIDEST[0]), min(middle + half, WIDEST[1])
