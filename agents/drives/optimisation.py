@@ -5,6 +5,9 @@ moves. Restarts around the best vertex, with a fresh simplex, take Nelder-Mead o
 
 Beside it, for Ω1: Gauss-Newton on the depth error at the inner steps. The drive enters the error nearly linearly, so
 a few steps do; a Jacobian is the run of one neighbour of the drive for each variable, all side by side.
+
+Under the winch's limits (``control_period``) what is optimised is what is played: a drive is judged by the motion of the
+drum that follows it. The guess is then fitted to what the winch makes of the inverse, which it can follow.
 """
 
 from __future__ import annotations
@@ -28,6 +31,7 @@ from agents.drives.functions import (
     harmonic_jacobian,
     harmonic_samples,
     spline_matrices,
+    start_of_harmonics,
     uniform_harmonic_samples,
 )
 from agents.drives.objectives import FINE_STEP, Objective, Outcome, coarse_step
@@ -51,7 +55,7 @@ _LEAST_SCALE = 0.02  # m of rope: a harmonic smaller than this is scaled as if i
 
 @dataclass(frozen=True, kw_only=True)
 class OptimisedDrive:
-    """A drive, its objective, and its result on its scenario (without the winch's limits)."""
+    """A drive, its objective, and its result on its scenario (as it was optimised: under the winch's limits, or not)."""
 
     drive: Drive
     family: str
@@ -99,6 +103,8 @@ def optimise(
     *,
     optimiser: Optimiser = "nelder-mead",
     start: npt.ArrayLike | None = None,
+    control_period: float | None = None,
+    free_start: bool = False,
 ) -> OptimisedDrive:
     """Find the drive of a family that makes an objective least on a scenario whose future is known.
 
@@ -106,7 +112,12 @@ def optimise(
     arguments give the same drive; ``seed`` turns the simplexes of the restarts. The search for Ω2 starts from the
     optimum of Ω1, which ``optimiser`` finds; it is itself always Nelder-Mead's, for Ω2 is no sum of squares.
     ``start`` gives decision variables to start from, such as those of a like scenario's drive; their number is then
-    ``intervals``, or 3 ``harmonics``. Raises InvalidValue for arguments out of range.
+    ``intervals``, or 3 ``harmonics``. With a ``control_period`` [s] drives are optimised under the winch's limits, as
+    ``DrivePolicy`` plays them at that control step; without, the drum follows them exactly, as in the paper.
+
+    ``free_start`` makes φ_H⁰ and A_0 decision variables, as in the paper's (35) and (36); there is one more, the first.
+    A drum that starts elsewhere than at 0 has lowered or raised the load before the start. No episode of the environment
+    begins so: it goes without ``control_period``. Raises InvalidValue for arguments out of range.
     """
     require_choice("family", family, FAMILIES)
     require_choice("objective", objective, OBJECTIVES)
@@ -116,13 +127,16 @@ def optimise(
     require_integer("seed", seed, low=0, high=2**32 - 1)
     require_integer("max_evaluations", max_evaluations, low=1, high=10**9)
     require_choice("optimiser", optimiser, OPTIMISERS)
-    size = intervals if family == "spline" else 3 * harmonics
+    if free_start and control_period is not None:
+        raise InvalidValue("free_start, control_period: give one of the two: an episode begins with the drum at 0")
+    size = (intervals if family == "spline" else 3 * harmonics) + int(free_start)
     given = None if start is None else np.asarray(start, dtype=np.float64)
     if given is not None and (given.shape != (size,) or not np.isfinite(given).all()):
         raise InvalidValue(f"start of shape {given.shape}: must be {size} finite decision variables")
     begin = time.perf_counter()
-    coarse = Objective(scenario, duration, coarse_step(scenario))
-    guess = _spline_guess(coarse, intervals, given) if family == "spline" else _harmonic_guess(coarse, harmonics, given)
+    coarse = Objective(scenario, duration, coarse_step(scenario), control_period)
+    number = intervals if family == "spline" else harmonics
+    guess = (_spline_guess if family == "spline" else _harmonic_guess)(coarse, number, given, free_start)
     first = max_evaluations if objective == "omega1" else max(1, max_evaluations // 2)
     search = _Search(coarse, np.random.default_rng(seed), progress)
     if optimiser == "gauss-newton":
@@ -131,9 +145,10 @@ def optimise(
         x = search.run(guess.x, guess, "omega1", first)
     if objective == "omega2":
         x = search.run(x, guess, "omega2", max_evaluations)
-    drive: Drive = (SplineDrive if family == "spline" else HarmonicDrive).from_variables(x, float(duration))
+    kind = SplineDrive if family == "spline" else HarmonicDrive
+    drive: Drive = kind.from_variables(x, float(duration), free_start)
     seconds = time.perf_counter() - begin
-    outcome = Objective(scenario, duration, min(FINE_STEP, coarse.step)).drive(drive)
+    outcome = Objective(scenario, duration, min(FINE_STEP, coarse.step), control_period).drive(drive)
     return OptimisedDrive(
         drive=drive,
         family=family,
@@ -156,16 +171,25 @@ class _Guess:
     scale: FloatArray
     """Change of each variable that moves about one metre of rope."""
     sample: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-    """Angle and speed (T,) of a drive at the objective's times, from its variables (n,)."""
+    """Angle and speed (S,) of a drive at the objective's samples, from its variables (n,)."""
     jacobian: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-    """Jacobians (T, n) of angle and speed by the variables."""
+    """Jacobians (S, n) of angle and speed by the variables."""
 
 
-def _spline_guess(objective: Objective, intervals: int, given: FloatArray | None) -> _Guess:
-    angle, speed = spline_matrices(objective.duration, intervals, objective.times)
+def _wanted(objective: Objective) -> FloatArray:
+    """Drum angle [rad] at the objective's samples that a guess is fitted to: the required one, as the drum follows it."""
+    if objective.control_period is None:
+        return required_angle(objective)
+    stride = (len(objective.times) - 1) // (len(objective.samples) - 1)
+    needed = required_angle(objective)[::stride]
+    return objective.drum(needed, np.gradient(needed, objective.samples))[0][::stride]
+
+
+def _spline_guess(objective: Objective, intervals: int, given: FloatArray | None, free_start: bool) -> _Guess:
+    angle, speed = spline_matrices(objective.duration, intervals, objective.samples, free_start)
     # Least squares, not mere interpolation: with few intervals the knots share the error.
-    x = np.linalg.lstsq(angle, required_angle(objective), rcond=None)[0] if given is None else given
-    scale = np.full(intervals, 1.0 / objective.scenario.crane.winch.drum_radius)
+    x = np.linalg.lstsq(angle, _wanted(objective), rcond=None)[0] if given is None else given
+    scale = np.full(len(x), 1.0 / objective.scenario.crane.winch.drum_radius)
     return _Guess(
         x=np.asarray(x, dtype=np.float64),
         scale=scale,
@@ -174,23 +198,35 @@ def _spline_guess(objective: Objective, intervals: int, given: FloatArray | None
     )
 
 
-def _harmonic_guess(objective: Objective, harmonics: int, given: FloatArray | None) -> _Guess:
-    times = objective.times
-    x = _fitted_harmonics(times, required_angle(objective), harmonics) if given is None else given
+def _harmonic_guess(objective: Objective, harmonics: int, given: FloatArray | None, free_start: bool) -> _Guess:
+    times, skip = objective.samples, int(free_start)
+    if given is None:
+        fitted = _fitted_harmonics(times, _wanted(objective), harmonics)
+        x = np.array([-start_of_harmonics(fitted), *fitted]) if free_start else fitted
+    else:
+        x = given
     radius = objective.scenario.crane.winch.drum_radius
-    size = np.maximum(np.abs(x[0::3]), _LEAST_SCALE / radius)
+    size = np.maximum(np.abs(x[skip::3]), _LEAST_SCALE / radius)
     # A change of one unit of each scaled variable moves about one metre of rope.
-    scale = np.empty_like(x)
-    scale[0::3] = 1.0 / radius
-    scale[1::3] = 2.0 / (size * radius * objective.duration)
-    scale[2::3] = 1.0 / (size * radius)
+    scale = np.full(len(x), 1.0 / radius)
+    scale[skip + 1 :: 3] = 2.0 / (size * radius * objective.duration)
+    scale[skip + 2 :: 3] = 1.0 / (size * radius)
     step, count = float(times[1]), len(times)
-    return _Guess(
-        x=x,
-        scale=scale,
-        sample=lambda v: uniform_harmonic_samples(v, step, count),
-        jacobian=lambda v: harmonic_jacobian(v, times),
-    )
+
+    def sample(v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        angle, speed = uniform_harmonic_samples(v[skip:], step, count)
+        return (angle + (v[0] + start_of_harmonics(v[1:])), speed) if free_start else (angle, speed)
+
+    def jacobian(v: FloatArray) -> tuple[FloatArray, FloatArray]:
+        angle, speed = harmonic_jacobian(v[skip:], times)
+        if not free_start:
+            return angle, speed
+        a, p = v[1::3], v[3::3]
+        angle[:, 0::3] += np.sin(p)
+        angle[:, 2::3] += a * np.cos(p)
+        return np.insert(angle, 0, 1.0, axis=1), np.insert(speed, 0, 0.0, axis=1)
+
+    return _Guess(x=x, scale=scale, sample=sample, jacobian=jacobian)
 
 
 def _fitted_harmonics(times: FloatArray, needed: FloatArray, harmonics: int) -> FloatArray:
