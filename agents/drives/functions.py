@@ -4,9 +4,9 @@ The paper's spline (33) is φ_H = a_i t³ + b_i t² + c_i t + d_i on each interv
 X = [φ_H⁰, φ_H¹, …, φ_H^m], its values at the knots. Its pseudo-harmonic function (34) is
 φ_H = A_0 + Σ_i A_i sin(ω_i t + α_i,0), with (36) X = [A_0, A_1, ω_1, α_1,0, …, A_n, ω_n, α_n,0].
 
-There φ_H⁰ and A_0 are variables. A drum that starts elsewhere than at 0 has moved the load before the start, which an
-episode of the environment, whose load begins at its level, does not know. So the drives here start at φ_H(0) = 0 and have
-one variable less, unless they are given that variable: both kinds are offered.
+There φ_H⁰ and A_0 are variables. A drum that starts elsewhere than at 0 has moved the load before the start, which no
+episode of the environment knows, for there the load begins at its level. So the drives here start at φ_H(0) = 0 and
+have one variable less, unless they are given that variable: both kinds are offered.
 """
 
 from __future__ import annotations

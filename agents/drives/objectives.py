@@ -1,8 +1,8 @@
 """Objectives (31) and (32) of a prescribed drum angle, evaluated by the package's own integrator.
 
-Ω1 = ∫ (x_L3 - h)² dt [m² s], Ω2 = max |x_L3 - h| [m] over [0, t_k] on the simplified model; the rope does not part. As
-in the paper, the drum follows the drive exactly; or, where a control period is given, as the winch can from rest, within
-its limits of speed and acceleration, which is what ``DrivePolicy`` makes of the drive in the environment.
+Ω1 = ∫ (x_L3 - h)² dt [m² s], Ω2 = max |x_L3 - h| [m] over [0, t_k] on the simplified model; the rope does not part.
+As in the paper, the drum follows the drive exactly; or, where a control period is given, as the winch can from rest,
+within its limits of speed and acceleration, which is what ``DrivePolicy`` makes of the drive in the environment.
 """
 
 from __future__ import annotations
@@ -173,8 +173,8 @@ class Objective:
     """A scenario laid out for fast evaluation: the pulley's path at every half inner step, computed once.
 
     With a ``control_period`` [s] the drum follows drives as the winch can, by the law of ``Follower``, from rest at 0;
-    without, it follows them exactly. A drive that starts at φ_H(0) ≠ 0 has then paid out rope before the start: the load
-    hangs at rest by so much lower, or higher.
+    without, it follows them exactly. A drive that starts at φ_H(0) ≠ 0 has then paid out rope before the start: the
+    load hangs at rest by so much lower, or higher.
     """
 
     def __init__(
