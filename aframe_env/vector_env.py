@@ -81,6 +81,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         self._seeds: list[int] = [-1] * num_envs
         self._ended = np.zeros(num_envs, dtype=np.bool_)
         self._everything = np.ones(num_envs, dtype=np.bool_)
+        self._final_state: npt.NDArray[np.float64] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out the renderer: a copy opens its own, whose history begins anew."""
@@ -90,6 +91,12 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
     def simulation(self) -> Simulation:
         """The simulation behind the environment, for reading."""
         return self._simulation
+
+    @property
+    def last_state(self) -> npt.NDArray[np.float64]:
+        """Full states (num_envs, 14) at the end of the last step, for reading: of the rows that SAME_STEP restarted
+        since, the ones that they ended in."""
+        return self._simulation.state if self._final_state is None else self._final_state
 
     @property
     def scenarios(self) -> tuple[Scenario | None, ...]:
@@ -124,6 +131,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
                 self._generators[index], self._seeds[index] = seeding.np_random(seeds[index])
         self._restart(mask, scenarios)
         self._ended &= ~mask
+        self._final_state = None
         self._record()
         return self._simulation.observe(), self._infos(mask)
 
@@ -150,7 +158,9 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
             truncations[fresh] = False
         self._ended = terminations | truncations
         final: dict[str, Any] = {}
+        self._final_state = None
         if self._autoreset is AutoresetMode.SAME_STEP and self._ended.any():
+            self._final_state = simulation.state.copy()
             final = self._finals(self._ended)
             self._restart(self._ended, None)
             self._ended = np.zeros(self.num_envs, dtype=np.bool_)

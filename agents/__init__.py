@@ -1,5 +1,8 @@
 """Policies for AFrameHeave: optimised drives, feedback laws, learned agents, all behind one protocol."""
 
 from agents.learned.agent import load
+from agents.learned.feature_policy import FeaturePolicy
+from agents.learned.interface import InterfaceConfig
+from agents.learned.wrappers import AgentInterface, AgentVectorInterface
 
-__all__ = ["load"]
+__all__ = ["AgentInterface", "AgentVectorInterface", "FeaturePolicy", "InterfaceConfig", "load"]

@@ -26,10 +26,10 @@ from agents.control.optimum import CommandSequence, optimise
 from agents.control.predictive import PredictiveControl
 from agents.drives import map as drive_map
 from agents.drives.map_policy import DriveMapPolicy
-from agents.drives.optimisation import OptimisedDrive
+from agents.drives.optimisation import Optimiser
 from agents.drives.policy import DrivePolicy
 from agents.drives.realtime_map import RealTimeMapPolicy
-from agents.drives.tuned import TUNED, Tuned, optimised
+from agents.drives.tuned import TUNED, Tuned, optimised, optimised_as_played
 from agents.learned import agent as learned
 from agents.policy import DrumStill, FloatArray, Knowledge, Policy
 
@@ -79,7 +79,7 @@ class PolicySpec:
     name: str
     build: Callable[[BuildContext], Policy]
     for_each_scenario: bool = False
-    """True if building it takes an optimisation for each scenario: it then runs in the first few of them only."""
+    """True if building it takes an optimisation for each scenario: it may then run in the first few of them only."""
     control_period: float | None = None
     """Control step that an agent was trained at, s; None: any."""
 
@@ -88,21 +88,19 @@ def _drum_still(context: BuildContext) -> Policy:
     return DrumStill()
 
 
-def _optimised(context: BuildContext, scenarios: Sequence[Scenario], tuned: Tuned) -> list[OptimisedDrive]:
-    return context.spread(partial(optimised, tuned, context.config.duration), scenarios)
-
-
 def _nominal_drive(name: str, tuned: Tuned) -> PolicySpec:
     def build(context: BuildContext) -> Policy:
-        drives = _optimised(context, [context.nominal], tuned)
+        drives = context.spread(partial(optimised, tuned, context.config.duration), [context.nominal])
         return DrivePolicy(name=name, drives=drives * len(context.scenarios))
 
     return PolicySpec(name, build)
 
 
-def _drive_for_each(name: str, tuned: Tuned) -> PolicySpec:
+def _drive_for_each(name: str, tuned: Tuned, optimiser: Optimiser = "nelder-mead") -> PolicySpec:
     def build(context: BuildContext) -> Policy:
-        drives = _optimised(context, context.scenarios, tuned)
+        config = context.config
+        solve = partial(optimised_as_played, tuned, config.duration, config.control_period, optimiser)
+        drives = context.spread(solve, context.scenarios)
         return DrivePolicy(name=name, drives=drives, knows=Knowledge.FUTURE)
 
     return PolicySpec(name, build, for_each_scenario=True)
@@ -135,6 +133,11 @@ REGISTRY: Final[dict[str, PolicySpec]] = {
         _output_zero(lambda context: context.sensors, "output zero on sensors"),
         OPTIMUM,
         *(_drive_for_each(f"{name} for each scenario", how) for name, how in TUNED.items()),
+        *(
+            _drive_for_each(f"{name} for each scenario, Gauss-Newton", how, "gauss-newton")
+            for name, how in TUNED.items()
+            if how.objective == "omega1"
+        ),
     )
 }
 """Policies by name."""

@@ -1,6 +1,8 @@
 """Gauss-Newton beside Nelder-Mead, on the paper's case and on held-out seas: ``python -m train.optimisers``.
 
-Writes comparison.json and comparison.md (evaluations and least Ω1 of each) and run.json into the output folder.
+Writes comparison.json and comparison.md (evaluations and least Ω1 of each; then, under the winch's limits, how many
+intervals and harmonics pay), jobs.sqlite (finished searches of the second part: it resumes) and run.json into the
+output folder.
 """
 
 from __future__ import annotations
@@ -10,18 +12,26 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Final
 
+import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from aframe_env.scenario import ScenarioSource
+from aframe_env.config import TaskConfig
+from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.validation import require_integer
+from agents.control.optimum import optimise as best_commands
+from agents.control.optimum import saturating
+from agents.drives import following, functions, guesses, objectives, optimisation
 from agents.drives.objectives import Objective, coarse_step
 from agents.drives.optimisation import FAMILIES, OPTIMISERS, Family, Optimiser, optimise
-from agents.rollout import held_out_scenarios
+from agents.drives.tuned import EVALUATIONS
+from agents.policy import DrumStill
+from agents.rollout import held_out_scenarios, run
 from train.drives.experiment import paper_case
 from train.shared.cli import parse
+from train.shared.job_store import JobStore, version_of
 from train.shared.jobs import run_jobs
 from train.shared.markdown import table
 from train.shared.run_folder import RunOptions, open_run, user_errors, write_json, write_text
@@ -37,12 +47,21 @@ class Options(RunOptions, ScenarioOptions):
     """Number of held-out scenarios beside the paper's case; or a TOML file with a distribution of your own."""
     max_evaluations: int = 20_000
     """Most evaluations of the objective for each drive."""
+    first_limited: int = 22
+    """First held-out scenario of the second part: from here on some ask more of the winch than it has."""
+    limited: int = 20
+    """Number of held-out scenarios of the second part, under the winch's limits."""
+    limited_evaluations: int = EVALUATIONS
+    """Most evaluations of the objective for each drive of the second part."""
     workers: int | None = None
     """Worker processes; by default one for each core."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require_integer("max_evaluations", self.max_evaluations, low=1, high=10**9)
+        require_integer("first_limited", self.first_limited, low=0, high=10**6)
+        require_integer("limited", self.limited, low=0, high=10_000)
+        require_integer("limited_evaluations", self.limited_evaluations, low=1, high=10**9)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,6 +111,81 @@ def solve(source: ScenarioSource, search: Search) -> Found:
     return Found(search, len(found.drive.variables), still, found.omega1, found.evaluations, round(found.seconds, 3))
 
 
+NUMBERS: Final[dict[Family, tuple[int, ...]]] = {"spline": (24, 48, 96, 144), "harmonic": (4, 8, 16, 24)}
+"""Intervals and harmonics of the second part."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitedSearch:
+    """One search for the least Ω1 under the winch's limits."""
+
+    scenario: int
+    """Number of the held-out scenario."""
+    family: Family
+    number: int
+    """Intervals or harmonics."""
+    optimiser: Optimiser
+    max_evaluations: int
+
+
+@dataclass(frozen=True)
+class Played:
+    """Result of a search under the winch's limits."""
+
+    rms: float
+    """m."""
+    variables: int
+    evaluations: int
+    seconds: float
+
+
+def solve_limited(source: ScenarioSource, search: LimitedSearch) -> Played:
+    """Run a search on the task as it is by default."""
+    config = TaskConfig()
+    found = optimise(
+        search.family,
+        held_out_scenarios(source, search.scenario + 1)[-1],
+        "omega1",
+        config.duration,
+        search.number if search.family == "spline" else 3,
+        search.number if search.family == "harmonic" else 1,
+        max_evaluations=search.max_evaluations,
+        optimiser=search.optimiser,
+        control_period=config.control_period,
+    )
+    return Played(found.rms, len(found.drive.variables), found.evaluations, round(found.seconds, 3))
+
+
+def limited_markdown(scenarios: Sequence[Scenario], searches: Sequence[LimitedSearch], found: Sequence[Played]) -> str:
+    """What each number of intervals or harmonics brings, as a table."""
+    still = run(DrumStill(), scenarios).rms
+    best = 1.0 - np.sqrt(best_commands(scenarios).omega1 / TaskConfig().duration) / still
+    hard = saturating(scenarios)
+    lines = []
+    for i in range(0, len(searches), len(scenarios)):
+        first, part = searches[i], found[i : i + len(scenarios)]
+        reduction = 1.0 - np.array([each.rms for each in part]) / still
+        share = reduction / best
+        name = "intervals" if first.family == "spline" else "harmonics"
+        lines.append(
+            (
+                f"{first.family}, {first.number} {name}",
+                str(part[0].variables),
+                first.optimiser,
+                f"{np.median(reduction):.2%}",
+                f"{reduction.mean():.2%}",
+                f"{share.mean():.2%}",
+                f"{share[hard].mean():.2%}" if hard.any() else "",
+                f"{np.mean([each.evaluations for each in part]):,.0f}",
+                f"{np.mean([each.seconds for each in part]):.2f}",
+            )
+        )
+    heads = ("drive", "variables", "optimiser", "median", "mean", "share of the optimum", "where the winch saturates")
+    return LIMITED.format(count=len(scenarios), hard=int(hard.sum())) + table(
+        (*heads, "evaluations", "seconds a scenario"), lines
+    )
+
+
 def markdown(found: Sequence[Found]) -> str:
     """The comparison as a table: a row for each drive, the optimisers side by side."""
     pairs: dict[tuple[int | None, Family], dict[Optimiser, Found]] = {}
@@ -119,6 +213,46 @@ gives a column of Gauss-Newton's Jacobian counts as an evaluation; at most {limi
 """
 
 
+LIMITED = """
+## Under the winch's limits
+Heave reduction over {count} held-out scenarios, {hard} of which ask more of the winch than it has, and its share of the
+winch-limited optimum's. A drive is judged by what the winch makes of it, from rest.
+
+"""
+
+
+def study_limits(options: Options, folder: Path, progress: Progress) -> str:
+    """Second part of comparison.md: drives under the winch's limits; finished searches are kept in ``folder``."""
+    numbers = range(options.first_limited, options.first_limited + options.limited)
+    if not numbers:
+        return ""
+    searches = [
+        LimitedSearch(
+            scenario=scenario,
+            family=family,
+            number=number,
+            optimiser=optimiser,
+            max_evaluations=options.limited_evaluations,
+        )
+        for family in FAMILIES
+        for number in NUMBERS[family]
+        for optimiser in OPTIMISERS
+        for scenario in numbers
+    ]
+    version = version_of(following, functions, guesses, objectives, optimisation)
+    with JobStore(folder / "jobs.sqlite", Played, version) as store:
+        found = run_jobs(
+            partial(solve_limited, options.source),
+            searches,
+            store=store,
+            workers=options.workers,
+            progress=progress,
+            description="under the winch's limits",
+        )
+    scenarios = held_out_scenarios(options.source, numbers.stop)[numbers.start :]
+    return limited_markdown(scenarios, searches, found)
+
+
 def main() -> int:
     """Run the command."""
     with user_errors():
@@ -139,10 +273,11 @@ def main() -> int:
                     progress=progress,
                     description="searches",
                 )
+                limited = study_limits(options, opened.folder, progress)
         except KeyboardInterrupt:
             console.print("interrupted: nothing was written")
             return 130
-        text = INTRODUCTION.format(command=opened.command, limit=options.max_evaluations) + markdown(found)
+        text = INTRODUCTION.format(command=opened.command, limit=options.max_evaluations) + markdown(found) + limited
         console.print(text, soft_wrap=True, markup=False)
         write_text(opened.folder / "comparison.md", text)
         write_json(opened.folder / "comparison.json", [asdict(each) for each in found])

@@ -1,11 +1,12 @@
-"""Open-loop drives: the drum angle as a function of time, φ_H(t) with φ_H(0) = 0.
+"""Open-loop drives: the drum angle as a function of time, φ_H(t).
 
 The paper's spline (33) is φ_H = a_i t³ + b_i t² + c_i t + d_i on each interval, with the decision variables (35)
 X = [φ_H⁰, φ_H¹, …, φ_H^m], its values at the knots. Its pseudo-harmonic function (34) is
 φ_H = A_0 + Σ_i A_i sin(ω_i t + α_i,0), with (36) X = [A_0, A_1, ω_1, α_1,0, …, A_n, ω_n, α_n,0].
 
-There φ_H⁰ and A_0 are variables. A drum that starts elsewhere than at 0 has moved the load before the start: the drives
-here start at φ_H(0) = 0, and have one variable less.
+There φ_H⁰ and A_0 are variables. A drum that starts elsewhere than at 0 has moved the load before the start, which no
+episode of the environment knows, for there the load begins at its level. So the drives here start at φ_H(0) = 0 and
+have one variable less, unless they are given that variable: both kinds are offered.
 """
 
 from __future__ import annotations
@@ -56,9 +57,9 @@ def _finite(name: str, values: tuple[float, ...]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class SplineDrive:
-    """Cubic spline on n equal intervals of [0, t_k], eq. (33); decision variables (35) without φ_H⁰, which is 0.
+    """Cubic spline on n equal intervals of [0, t_k], eq. (33); decision variables (35), or those without φ_H⁰.
 
-    It is twice continuously differentiable through φ_H(0) = 0 and the values at the knots t_1 .. t_n. Its ends are
+    It is twice continuously differentiable through its values at the knots t_0 = 0, t_1 .. t_n. Its ends are
     natural (no second derivative at 0 and t_k), which is our choice: the least curved of all interpolants, and the one
     whose speed at t = 0 is free to meet that of a deck already under way.
     """
@@ -67,22 +68,27 @@ class SplineDrive:
     """t_k, s."""
     values: tuple[float, ...]
     """φ_H at t_1 .. t_n, rad."""
+    first: float | None = None
+    """φ_H⁰, φ_H at t_0, rad, where it is a decision variable; None: it is 0, and none."""
 
     def __post_init__(self) -> None:
         require_number("duration", self.duration, "s", low=0.0, low_open=True)
         if len(self.values) < 3:
             raise InvalidValue(f"values: {len(self.values)} knots: a spline drive needs at least 3 intervals")
         _finite("values", self.values)
+        require_number("first", self.first or 0.0, "rad")
 
     @classmethod
-    def from_variables(cls, variables: npt.ArrayLike, duration: float) -> SplineDrive:
-        """Drive with the decision variables (n,) rad over ``duration`` s."""
-        return cls(duration=duration, values=tuple(np.asarray(variables, dtype=np.float64).tolist()))
+    def from_variables(cls, variables: npt.ArrayLike, duration: float, free_start: bool = False) -> SplineDrive:
+        """Drive with the decision variables (n,) rad over ``duration`` s; (n + 1,) with a ``free_start``."""
+        values = np.asarray(variables, dtype=np.float64).tolist()
+        first = values.pop(0) if free_start and values else None
+        return cls(duration=duration, values=tuple(values), first=first)
 
     @property
     def variables(self) -> FloatArray:
-        """Values at the knots t_1 .. t_n, rad: (n,)."""
-        return np.array(self.values)
+        """Values at the knots t_1 .. t_n, rad: (n,); with the one at t_0 in front of them where it is free."""
+        return np.array(self.values if self.first is None else (self.first, *self.values))
 
     @property
     def intervals(self) -> int:
@@ -92,7 +98,7 @@ class SplineDrive:
     @cached_property
     def _spline(self) -> CubicSpline[np.float64]:
         knots = np.linspace(0.0, self.duration, self.intervals + 1)
-        return CubicSpline(knots, np.concatenate([[0.0], self.values]), bc_type="natural")
+        return CubicSpline(knots, [self.first or 0.0, *self.values], bc_type="natural")
 
     def angle(self, time: npt.ArrayLike) -> FloatArray:
         """φ_H, rad, at ``time`` s."""
@@ -103,19 +109,23 @@ class SplineDrive:
         return np.asarray(self._spline(np.asarray(time, dtype=np.float64), 1))
 
 
-def spline_matrices(duration: float, intervals: int, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Matrices (T, n) that turn the knots' values into angle and speed of a ``SplineDrive`` at ``times``."""
+def spline_matrices(
+    duration: float, intervals: int, times: FloatArray, free_start: bool = False
+) -> tuple[FloatArray, FloatArray]:
+    """Matrices (T, n) that turn the variables of a ``SplineDrive`` into its angle and speed at ``times``.
+
+    (T, n + 1) with a ``free_start``.
+    """
     knots = np.linspace(0.0, duration, intervals + 1)
-    spline = CubicSpline(knots, np.eye(intervals + 1)[:, 1:], bc_type="natural")
+    spline = CubicSpline(knots, np.eye(intervals + 1)[:, 0 if free_start else 1 :], bc_type="natural")
     return np.ascontiguousarray(spline(times)), np.ascontiguousarray(spline(times, 1))
 
 
 @dataclass(frozen=True, kw_only=True)
 class HarmonicDrive:
-    """Pseudo-harmonic drive, eq. (34); decision variables (36) without A_0.
+    """Pseudo-harmonic drive, eq. (34); decision variables (36), or those without A_0.
 
-    φ_H(t) = Σ_i a_i (sin(ω_i t + α_i) - sin α_i), i = 1 .. n: harmonics of free amplitude, frequency and phase.
-    A_0 = -Σ_i a_i sin α_i is no variable, but the constant that makes φ_H(0) = 0.
+    φ_H(t) = A_0 + Σ_i a_i sin(ω_i t + α_i), i = 1 .. n: harmonics of free amplitude, frequency and phase.
     """
 
     duration: float
@@ -126,35 +136,47 @@ class HarmonicDrive:
     """ω_i, rad/s."""
     phases: tuple[float, ...]
     """α_i, rad."""
+    constant: float | None = None
+    """A_0, rad, where it is a decision variable; None: it is -Σ_i a_i sin α_i, which makes φ_H(0) = 0, and none."""
 
     def __post_init__(self) -> None:
         require_number("duration", self.duration, "s", low=0.0, low_open=True)
+        require_number("constant", self.constant or 0.0, "rad")
         if not len(self.amplitudes) == len(self.frequencies) == len(self.phases) > 0:
             raise InvalidValue("amplitudes, frequencies, phases: must be of one length, at least 1")
         for name in ("amplitudes", "frequencies", "phases"):
             _finite(name, getattr(self, name))
 
     @classmethod
-    def from_variables(cls, variables: npt.ArrayLike, duration: float) -> HarmonicDrive:
-        """Drive with the decision variables (a_1, ω_1, α_1, a_2, ...) over ``duration`` s."""
+    def from_variables(cls, variables: npt.ArrayLike, duration: float, free_start: bool = False) -> HarmonicDrive:
+        """Drive with the decision variables (a_1, ω_1, α_1, a_2, ...) over ``duration`` s.
+
+        With a ``free_start`` A_0 stands in front of them.
+        """
         v = np.asarray(variables, dtype=np.float64)
-        if v.ndim != 1 or len(v) % 3 or not len(v):
-            raise InvalidValue(f"variables: shape {v.shape}: must be (3 n,)")
-        a, w, p = (tuple(part.tolist()) for part in v.reshape(-1, 3).T)
-        return cls(duration=duration, amplitudes=a, frequencies=w, phases=p)
+        if v.ndim != 1 or len(v) % 3 != int(free_start) or len(v) < 3:
+            raise InvalidValue(f"variables: shape {v.shape}: must be ({'3 n + 1' if free_start else '3 n'},)")
+        a, w, p = (tuple(part.tolist()) for part in v[int(free_start) :].reshape(-1, 3).T)
+        constant = float(v[0]) if free_start else None
+        return cls(duration=duration, amplitudes=a, frequencies=w, phases=p, constant=constant)
 
     @property
     def variables(self) -> FloatArray:
-        """(a_1, ω_1, α_1, a_2, ω_2, α_2, ...): (3 n,) rad, rad/s, rad."""
-        return np.stack([self.amplitudes, self.frequencies, self.phases], axis=1).ravel()
+        """(a_1, ω_1, α_1, a_2, ω_2, α_2, ...): (3 n,) rad, rad/s, rad; with A_0 in front of them where it is free."""
+        return self._harmonics if self.constant is None else np.array([self.constant, *self._harmonics])
 
     def angle(self, time: npt.ArrayLike) -> FloatArray:
         """φ_H, rad, at ``time`` s."""
-        return harmonic_samples(self.variables, np.asarray(time, dtype=np.float64))[0]
+        angle = harmonic_samples(self._harmonics, np.asarray(time, dtype=np.float64))[0]
+        return angle if self.constant is None else angle + self.constant + start_of_harmonics(self._harmonics)
 
     def speed(self, time: npt.ArrayLike) -> FloatArray:
         """dφ_H/dt, rad/s."""
-        return harmonic_samples(self.variables, np.asarray(time, dtype=np.float64))[1]
+        return harmonic_samples(self._harmonics, np.asarray(time, dtype=np.float64))[1]
+
+    @property
+    def _harmonics(self) -> FloatArray:
+        return np.stack([self.amplitudes, self.frequencies, self.phases], axis=1).ravel()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,17 +209,21 @@ class RampedDrive:
 
     def _samples(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
         turned, speed = harmonic_samples(self.variables, times)
-        at_start = float(np.sum(self.variables[0::3] * np.sin(self.variables[2::3])))
         if not self.ramp:
             return turned, speed
-        angle = turned + at_start
+        angle = turned + start_of_harmonics(self.variables)
         ramp = np.array([smooth_ramp(t, 1.0 / self.ramp, 0.0)[:2] for t in times.ravel().tolist()])
         factor, rate = ramp.reshape(-1, 2).T.reshape(2, *times.shape)
         return factor * angle, factor * speed + rate * angle
 
 
+def start_of_harmonics(variables: FloatArray) -> float:
+    """Σ_i a_i sin α_i [rad] of the variables (a_1, ω_1, α_1, a_2, ...): where the harmonics' sum starts."""
+    return float(np.sum(variables[0::3] * np.sin(variables[2::3])))
+
+
 def harmonic_samples(variables: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Angle and speed at ``times`` of the ``HarmonicDrive`` with these variables."""
+    """Angle and speed at ``times`` of the ``HarmonicDrive`` with these variables, from φ_H(0) = 0."""
     angle, speed = np.zeros(times.shape), np.zeros(times.shape)
     for a, w, p in variables.reshape(-1, 3).tolist():
         argument = w * times + p

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.scenario import Scenario
+from agents.drives.following import Follower
 from agents.drives.forecast import Measurement, known_harmonics
 from agents.drives.map import DriveMap
-from agents.drives.policy import Follower
 from agents.policy import FloatArray, Knowledge
 
 

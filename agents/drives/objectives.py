@@ -1,7 +1,8 @@
 """Objectives (31) and (32) of a prescribed drum angle, evaluated by the package's own integrator.
 
-Ω1 = ∫ (x_L3 - h)² dt [m² s], Ω2 = max |x_L3 - h| [m] over [0, t_k] on the simplified model. As in the paper,
-the drum follows the drive exactly: the winch has no limits here, and the rope does not part.
+Ω1 = ∫ (x_L3 - h)² dt [m² s], Ω2 = max |x_L3 - h| [m] over [0, t_k] on the simplified model; the rope does not part.
+As in the paper, the drum follows the drive exactly; or, where a control period is given, as the winch can from rest,
+within its limits of speed and acceleration, which is what ``DrivePolicy`` makes of the drive in the environment.
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.blocks import three
 from aframe_env.dynamics.compiling import kernel, scalar
 from aframe_env.dynamics.load import Load, RopeEnd, load_constants, rk4_step
+from aframe_env.dynamics.start import inner_steps
 from aframe_env.dynamics.vector import Vector
 from aframe_env.engine import Engine
 from aframe_env.scenario import Scenario
 from aframe_env.scenario.motion import require_coverage
-from aframe_env.validation import require_number
+from aframe_env.validation import InvalidValue, require_number
+from agents.drives.following import played
 from agents.drives.functions import Drive
 
 FloatArray = npt.NDArray[np.float64]
@@ -101,9 +104,11 @@ def _rope_end(point, angle, speed, drum):  # type: ignore[no-untyped-def]
 def _kernel() -> Callable[..., tuple[float, float, float]]:
 
     @kernel
-    def evaluate(path, angle, speed, row, h, errors):  # type: ignore[no-untyped-def]
+    def evaluate(path, angle, speed, row, lowering, h, errors):  # type: ignore[no-untyped-def]
         target, constants, drum = row[at.TARGET], load_constants(row, 1.0, 1, 0), _drum(row)  # type: ignore[no-untyped-call]
-        load = Load(three(row, at.LOAD_POSITION, 1, 0), three(row, at.LOAD_VELOCITY, 1, 0))
+        place = three(row, at.LOAD_POSITION, 1, 0)
+        place = Vector(place.x, place.y, place.z - lowering * angle[0])
+        load = Load(place, three(row, at.LOAD_VELOCITY, 1, 0))
         omega1 = 0.0
         lowest = highest = load.position.z - target
         errors[0] = load.position.z - target
@@ -127,14 +132,16 @@ def _kernel() -> Callable[..., tuple[float, float, float]]:
 def _lanes_kernel() -> Callable[..., None]:
 
     @kernel
-    def evaluate(path, angle, speed, more_angle, more_speed, row, h, errors):  # type: ignore[no-untyped-def]
+    def evaluate(path, angle, speed, more_angle, more_speed, row, lowering, h, errors):  # type: ignore[no-untyped-def]
         target, constants, drum = row[at.TARGET], load_constants(row, 1.0, 1, 0), _drum(row)  # type: ignore[no-untyped-call]
         lanes = more_angle.shape[1]
         place, velocity = three(row, at.LOAD_POSITION, 1, 0), three(row, at.LOAD_VELOCITY, 1, 0)
         # Arrays of their own, so that the compiler can tell them apart and vectorise the loop over lanes.
         x, y, z = np.full(lanes, place.x), np.full(lanes, place.y), np.full(lanes, place.z)
         u, v, w = np.full(lanes, velocity.x), np.full(lanes, velocity.y), np.full(lanes, velocity.z)
-        errors[0] = place.z - target
+        for j in range(lanes):
+            z[j] -= lowering * (angle[0] + more_angle[0, j])
+            errors[0, j] = z[j] - target
         for i in range((path.shape[0] - 1) // 2):
             k = 2 * i
             a, b, c = path[k], path[k + 1], path[k + 2]
@@ -153,20 +160,44 @@ def _lanes_kernel() -> Callable[..., None]:
     return evaluate
 
 
-class Objective:
-    """A scenario laid out for fast evaluation: the pulley's path at every half inner step, computed once."""
+def _control_steps(duration: float, control_period: float) -> int:
+    """Whole control steps in ``duration`` s."""
+    require_number("control_period", control_period, "s", low=2e-3, high=2.0)
+    steps = round(duration / control_period)
+    if steps < 1 or abs(steps * control_period - duration) > 1e-9 * duration:
+        raise InvalidValue(f"duration = {duration:g} s: must be whole control steps of {control_period:g} s")
+    return steps
 
-    def __init__(self, scenario: Scenario, duration: float, max_step: float = FINE_STEP) -> None:
-        """Lay out ``duration`` [s] in (0, 3600] of a scenario with inner steps of at most ``max_step`` s."""
+
+class Objective:
+    """A scenario laid out for fast evaluation: the pulley's path at every half inner step, computed once.
+
+    With a ``control_period`` [s] the drum follows drives as the winch can, by the law of ``Follower``, from rest at 0;
+    without, it follows them exactly. A drive that starts at φ_H(0) ≠ 0 has then paid out rope before the start: the
+    load hangs at rest by so much lower, or higher.
+    """
+
+    def __init__(
+        self, scenario: Scenario, duration: float, max_step: float = FINE_STEP, control_period: float | None = None
+    ) -> None:
+        """Lay out ``duration`` [s] in (0, 3600] of a scenario with inner steps of at most ``max_step`` s.
+
+        With a control period, in [0.002, 2] s, the duration is whole control steps.
+        """
         require_number("duration", duration, "s", low=0.0, high=3600.0, low_open=True)
         require_number("max_step", max_step, "s", low=2e-3, high=0.2)
         require_coverage(scenario.motion, "duration", duration)
         self.scenario = scenario
         self.duration = float(duration)
-        self.steps = max(1, math.ceil(duration / max_step - 1e-9))
+        self.control_period = control_period
+        controls = 1 if control_period is None else _control_steps(self.duration, control_period)
+        self.steps = controls * inner_steps(self.duration / controls, max_step)
         self.step = self.duration / self.steps
+        self._stride = 1 if control_period is None else 2 * self.steps // controls
         self.times = np.linspace(0.0, self.duration, 2 * self.steps + 1)
-        """(2 steps + 1,) s, every half inner step: where drives are sampled."""
+        """(2 steps + 1,) s, every half inner step."""
+        self.samples = self.times[:: self._stride]
+        """(S,) s, where drives are sampled: at ``times``, or at the ends of the control steps."""
         # The engine itself moves the deck; at the ends of its control steps the pulley's place is exact.
         engine = Engine(1, 0.5 * self.step, max_inner_step=0.2)
         engine.reset_row(0, scenario)
@@ -182,36 +213,56 @@ class Objective:
         """The engine's row of the scenario, its load at the start."""
         for slot in (at.LOAD_POSITION, at.LOAD_VELOCITY):
             self._row[slot : slot + 3] = at_start[slot : slot + 3]
+        crane = scenario.crane
+        # A drum that starts at φ has paid out r φ of rope, which the load stretches, before the start.
+        self._lowering = crane.winch.drum_radius * (1.0 + scenario.weight / crane.rope.axial_stiffness)
         self._errors = np.empty(self.steps + 1)
 
     def evaluate(self, angle: FloatArray, speed: FloatArray) -> Outcome:
-        """Outcome of a drum angle [rad] and speed [rad/s] given at ``times``."""
-        omega1, lowest, highest = _kernel()(self.path, angle, speed, self._row, self.step, self._errors)
+        """Outcome of a drive's angle [rad] and speed [rad/s], given at ``samples``."""
+        return self._evaluate(*self.drum(angle, speed))
+
+    def _evaluate(self, angle: FloatArray, speed: FloatArray) -> Outcome:
+        """Outcome of the drum's angle [rad] and speed [rad/s] at ``times``."""
+        omega1, lowest, highest = _kernel()(self.path, angle, speed, self._row, self._lowering, self.step, self._errors)
         return Outcome(omega1, max(-lowest, highest), lowest, highest, self.duration)
 
+    def drum(self, angle: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Angle [rad] and speed [rad/s] of the drum at ``times``, under a drive's at ``samples``."""
+        if self.control_period is None:
+            return angle, speed
+        reach = float(self._row[at.MIN_ANGLE]), float(self._row[at.MAX_ANGLE])
+        return played(angle, speed, self.scenario.crane.winch, reach, self.control_period, self._stride)
+
     def errors(self, angle: FloatArray, speed: FloatArray) -> FloatArray:
-        """x_L3 - h at the inner steps, (steps + 1,) m, under an angle and speed given at ``times``."""
+        """x_L3 - h at the inner steps, (steps + 1,) m, under a drive's angle and speed at ``samples``."""
         self.evaluate(angle, speed)
         return self._errors.copy()
 
     def perturbed_errors(
         self, angle: FloatArray, speed: FloatArray, more_angle: FloatArray, more_speed: FloatArray
     ) -> FloatArray:
-        """x_L3 - h (steps + 1, n) m under n perturbed drives: ``more_angle``, ``more_speed`` (times, n) are added.
+        """x_L3 - h (steps + 1, n) m under n perturbed drives: ``more_angle``, ``more_speed`` (S, n) are added.
 
         They run side by side, in the lanes of the processor's registers.
         """
+        drum = self.drum(angle, speed)
+        if self.control_period is not None:
+            neighbours = [self.drum(angle + a, speed + s) for a, s in zip(more_angle.T, more_speed.T, strict=True)]
+            moved = np.array(neighbours) - drum
+            more_angle, more_speed = np.ascontiguousarray(moved.transpose(1, 2, 0))
         errors = np.empty((self.steps + 1, more_angle.shape[1]))
-        _lanes_kernel()(self.path, angle, speed, more_angle, more_speed, self._row, self.step, errors)
+        _lanes_kernel()(self.path, *drum, more_angle, more_speed, self._row, self._lowering, self.step, errors)
         return errors
 
     def drive(self, drive: Drive) -> Outcome:
         """Outcome of a drive."""
-        return self.evaluate(drive.angle(self.times), drive.speed(self.times))
+        return self.evaluate(drive.angle(self.samples), drive.speed(self.samples))
 
     def still(self) -> Outcome:
         """Outcome of leaving the drum alone."""
-        return self.evaluate(np.zeros(len(self.times)), np.zeros(len(self.times)))
+        nothing = np.zeros(len(self.samples))
+        return self.evaluate(nothing, nothing)
 
     def trajectory(self, drive: Drive | None = None) -> tuple[FloatArray, FloatArray]:
         """Times (steps + 1,) s and x_L3 - h (steps + 1,) m under a drive, or with the drum still."""

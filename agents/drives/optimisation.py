@@ -5,6 +5,9 @@ moves. Restarts around the best vertex, with a fresh simplex, take Nelder-Mead o
 
 Beside it, for Ω1: Gauss-Newton on the depth error at the inner steps. The drive enters the error nearly linearly, so
 a few steps do; a Jacobian is the run of one neighbour of the drive for each variable, all side by side.
+
+Under the winch's limits (``control_period``) what is optimised is what is played: a drive is judged by the motion of
+the drum that follows it. The guess is then a drive that the winch can follow.
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -21,15 +24,8 @@ from scipy.optimize import least_squares, minimize
 
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
-from agents.drives.functions import (
-    Drive,
-    HarmonicDrive,
-    SplineDrive,
-    harmonic_jacobian,
-    harmonic_samples,
-    spline_matrices,
-    uniform_harmonic_samples,
-)
+from agents.drives.functions import Drive, HarmonicDrive, SplineDrive
+from agents.drives.guesses import Guess, excess, harmonic_guess, spline_guess, within_limits
 from agents.drives.objectives import FINE_STEP, Objective, Outcome, coarse_step
 
 FloatArray = npt.NDArray[np.float64]
@@ -46,12 +42,12 @@ _IMPROVEMENT = 2e-3  # a round of Nelder-Mead that gains less than this share en
 _NEIGHBOUR = 1e-4  # m of rope between a drive and the neighbours that give its Jacobian
 _TOLERANCE = 1e-6  # a Gauss-Newton step that gains less than this share of Ω1 is the last one
 _UNUSABLE = 1e6  # m: stands for an error that is not a number
-_LEAST_SCALE = 0.02  # m of rope: a harmonic smaller than this is scaled as if it were this large
+_PRICES = (10.0, 3.0, 1.0)  # of the excess over the winch's limits, in the rounds of Gauss-Newton under them
 
 
 @dataclass(frozen=True, kw_only=True)
 class OptimisedDrive:
-    """A drive, its objective, and its result on its scenario (without the winch's limits)."""
+    """A drive, its objective, and its result on its scenario as it was optimised."""
 
     drive: Drive
     family: str
@@ -72,20 +68,6 @@ class OptimisedDrive:
     """Wall-clock time of the search."""
 
 
-def required_angle(objective: Objective) -> FloatArray:
-    """Drum angle [rad] at the objective's times that would hold the load at h right below where the ship rests.
-
-    The rope's law solved for the unstretched length at a tension equal to the weight: what remains to be found by
-    optimisation is the pendulum's share, the start's transient, and the part that the family of drives cannot follow.
-    """
-    scenario = objective.scenario
-    crane = scenario.crane
-    load = np.array([*crane.pulley_position[:2], scenario.target_level])
-    distance = np.linalg.norm(objective.path[:, :3] - load, axis=1)
-    length = (distance + crane.drum_to_pulley) / (1.0 + scenario.weight / crane.rope.axial_stiffness)
-    return np.asarray((length - length[0]) / crane.winch.drum_radius)
-
-
 def optimise(
     family: Family,
     scenario: Scenario,
@@ -99,6 +81,8 @@ def optimise(
     *,
     optimiser: Optimiser = "nelder-mead",
     start: npt.ArrayLike | None = None,
+    control_period: float | None = None,
+    free_start: bool = False,
 ) -> OptimisedDrive:
     """Find the drive of a family that makes an objective least on a scenario whose future is known.
 
@@ -106,7 +90,12 @@ def optimise(
     arguments give the same drive; ``seed`` turns the simplexes of the restarts. The search for Ω2 starts from the
     optimum of Ω1, which ``optimiser`` finds; it is itself always Nelder-Mead's, for Ω2 is no sum of squares.
     ``start`` gives decision variables to start from, such as those of a like scenario's drive; their number is then
-    ``intervals``, or 3 ``harmonics``. Raises InvalidValue for arguments out of range.
+    ``intervals``, or 3 ``harmonics``. With a ``control_period`` [s] drives are optimised under the winch's limits, as
+    ``DrivePolicy`` plays them at that control step; without, the drum follows them exactly, as in the paper.
+
+    ``free_start`` makes φ_H⁰ and A_0 decision variables, as in the paper's (35) and (36); there is one more, the first.
+    A drum that starts elsewhere than at 0 has lowered or raised the load before the start. No episode of the
+    environment begins so: it goes without ``control_period``. Raises InvalidValue for arguments out of range.
     """
     require_choice("family", family, FAMILIES)
     require_choice("objective", objective, OBJECTIVES)
@@ -116,13 +105,18 @@ def optimise(
     require_integer("seed", seed, low=0, high=2**32 - 1)
     require_integer("max_evaluations", max_evaluations, low=1, high=10**9)
     require_choice("optimiser", optimiser, OPTIMISERS)
-    size = intervals if family == "spline" else 3 * harmonics
+    if free_start and control_period is not None:
+        raise InvalidValue("free_start, control_period: give one of the two: an episode begins with the drum at 0")
+    size = (intervals if family == "spline" else 3 * harmonics) + int(free_start)
     given = None if start is None else np.asarray(start, dtype=np.float64)
     if given is not None and (given.shape != (size,) or not np.isfinite(given).all()):
         raise InvalidValue(f"start of shape {given.shape}: must be {size} finite decision variables")
     begin = time.perf_counter()
-    coarse = Objective(scenario, duration, coarse_step(scenario))
-    guess = _spline_guess(coarse, intervals, given) if family == "spline" else _harmonic_guess(coarse, harmonics, given)
+    coarse = Objective(scenario, duration, coarse_step(scenario), control_period)
+    number = intervals if family == "spline" else harmonics
+    guess = (spline_guess if family == "spline" else harmonic_guess)(coarse, number, given, free_start)
+    if control_period is not None and given is None:
+        guess = within_limits(coarse, guess)
     first = max_evaluations if objective == "omega1" else max(1, max_evaluations // 2)
     search = _Search(coarse, np.random.default_rng(seed), progress)
     if optimiser == "gauss-newton":
@@ -131,9 +125,10 @@ def optimise(
         x = search.run(guess.x, guess, "omega1", first)
     if objective == "omega2":
         x = search.run(x, guess, "omega2", max_evaluations)
-    drive: Drive = (SplineDrive if family == "spline" else HarmonicDrive).from_variables(x, float(duration))
+    kind = SplineDrive if family == "spline" else HarmonicDrive
+    drive: Drive = kind.from_variables(x, float(duration), free_start)
     seconds = time.perf_counter() - begin
-    outcome = Objective(scenario, duration, min(FINE_STEP, coarse.step)).drive(drive)
+    outcome = Objective(scenario, duration, min(FINE_STEP, coarse.step), control_period).drive(drive)
     return OptimisedDrive(
         drive=drive,
         family=family,
@@ -147,92 +142,30 @@ def optimise(
     )
 
 
-@dataclass(frozen=True)
-class _Guess:
-    """Starting point of a search, and the family of drives."""
-
-    x: FloatArray
-    """Decision variables."""
-    scale: FloatArray
-    """Change of each variable that moves about one metre of rope."""
-    sample: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-    """Angle and speed (T,) of a drive at the objective's times, from its variables (n,)."""
-    jacobian: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-    """Jacobians (T, n) of angle and speed by the variables."""
-
-
-def _spline_guess(objective: Objective, intervals: int, given: FloatArray | None) -> _Guess:
-    angle, speed = spline_matrices(objective.duration, intervals, objective.times)
-    # Least squares, not mere interpolation: with few intervals the knots share the error.
-    x = np.linalg.lstsq(angle, required_angle(objective), rcond=None)[0] if given is None else given
-    scale = np.full(intervals, 1.0 / objective.scenario.crane.winch.drum_radius)
-    return _Guess(
-        x=np.asarray(x, dtype=np.float64),
-        scale=scale,
-        sample=lambda v: (angle @ v, speed @ v),
-        jacobian=lambda v: (angle, speed),
-    )
-
-
-def _harmonic_guess(objective: Objective, harmonics: int, given: FloatArray | None) -> _Guess:
-    times = objective.times
-    x = _fitted_harmonics(times, required_angle(objective), harmonics) if given is None else given
-    radius = objective.scenario.crane.winch.drum_radius
-    size = np.maximum(np.abs(x[0::3]), _LEAST_SCALE / radius)
-    # A change of one unit of each scaled variable moves about one metre of rope.
-    scale = np.empty_like(x)
-    scale[0::3] = 1.0 / radius
-    scale[1::3] = 2.0 / (size * radius * objective.duration)
-    scale[2::3] = 1.0 / (size * radius)
-    step, count = float(times[1]), len(times)
-    return _Guess(
-        x=x,
-        scale=scale,
-        sample=lambda v: uniform_harmonic_samples(v, step, count),
-        jacobian=lambda v: harmonic_jacobian(v, times),
-    )
-
-
-def _fitted_harmonics(times: FloatArray, needed: FloatArray, harmonics: int) -> FloatArray:
-    """Harmonics taken one by one from the residual's spectrum, all fitted anew after each."""
-    taken = slice(None, None, max(1, len(times) // 600))  # enough for waves; the fit stays quick
-    t, y = times[taken], needed[taken]
-
-    def residual(v: FloatArray) -> FloatArray:
-        return harmonic_samples(v, t)[0] - y
-
-    def jacobian(v: FloatArray) -> FloatArray:
-        return harmonic_jacobian(v, t)[0]
-
-    x = np.empty(0)
-    for _ in range(harmonics):
-        guess = _strongest(t, -residual(x))
-        x = least_squares(
-            residual,
-            np.concatenate([x, guess]),
-            jac=jacobian,
-            x_scale=np.tile([1.0, 0.1, 1.0], len(x) // 3 + 1),
-            max_nfev=60,
-        ).x
-    return x
-
-
-def _strongest(t: FloatArray, signal: FloatArray) -> FloatArray:
-    """Amplitude, frequency and phase of the strongest harmonic in a signal, from its zero-padded spectrum."""
-    centred = (signal - signal.mean()) * np.hanning(len(t))
-    size = 8 * len(t)
-    spectrum = np.abs(np.fft.rfft(centred, size))
-    frequencies = 2.0 * np.pi * np.fft.rfftfreq(size, t[1] - t[0])
-    frequency = float(frequencies[1 + int(np.argmax(spectrum[1:]))])
-    basis = np.stack([np.sin(frequency * t), np.cos(frequency * t), np.ones(len(t))], axis=1)
-    s, c, _ = np.linalg.lstsq(basis, signal, rcond=None)[0].tolist()
-    return np.array([np.hypot(s, c), frequency, np.arctan2(c, s)])
-
-
-def _gauss_newton(
-    objective: Objective, guess: _Guess, budget: int, progress: Progress | None
-) -> tuple[FloatArray, int]:
+def _gauss_newton(objective: Objective, guess: Guess, budget: int, progress: Progress | None) -> tuple[FloatArray, int]:
     """Variables of least Ω1 found within a budget of evaluations, and how many it took.
+
+    Under the winch's limits it goes in rounds. A drum that cannot follow catches up in leaps, by which no derivative
+    finds its way; so what a drive asks beyond the limits has a price, less in each round, and the best drive is kept.
+    """
+    if objective.control_period is None:
+        return _least_squares(objective, guess, budget, 0.0, progress)
+    evaluations, best = 1, objective.evaluate(*guess.sample(guess.x)).omega1
+    for price in _PRICES:
+        x, made = _least_squares(objective, guess, budget // len(_PRICES) - 1, price, None)
+        value = objective.evaluate(*guess.sample(x)).omega1
+        evaluations += made + 1
+        if value < best:
+            guess, best = replace(guess, x=x), value
+        if progress is not None:
+            progress(evaluations, best)
+    return guess.x, evaluations
+
+
+def _least_squares(
+    objective: Objective, guess: Guess, budget: int, price: float, progress: Progress | None
+) -> tuple[FloatArray, int]:
+    """Variables of least Ω1, with a price of the excess over the winch's limits, and the evaluations that it took.
 
     Gauss-Newton in a trust region. Each neighbour of the drive that gives a column of a Jacobian is an evaluation.
     """
@@ -244,25 +177,34 @@ def _gauss_newton(
     def variables(y: FloatArray) -> FloatArray:
         return guess.x + guess.scale * y
 
-    def error(y: FloatArray) -> FloatArray:
+    def residual(y: FloatArray) -> FloatArray:
         nonlocal evaluations, best
         evaluations += 1
-        result = weight * np.nan_to_num(objective.errors(*guess.sample(variables(y))), nan=_UNUSABLE)
+        v = variables(y)
+        angle, speed = guess.sample(v)
+        result = weight * np.nan_to_num(objective.errors(angle, speed), nan=_UNUSABLE)
         best = min(best, float(result @ result))
         if progress is not None:
             progress(evaluations, best)
-        return np.asarray(result)
+        if not price:
+            return np.asarray(result)
+        return np.concatenate([result, price * excess(objective, speed, guess.jacobian(v)[1])[0]])
 
     def jacobian(y: FloatArray) -> FloatArray:
         nonlocal evaluations
         evaluations += size
-        angle, speed = guess.sample(variables(y))
-        more = [_NEIGHBOUR * guess.scale * each for each in guess.jacobian(variables(y))]
+        v = variables(y)
+        angle, speed = guess.sample(v)
+        rows = guess.jacobian(v)
+        more = [_NEIGHBOUR * guess.scale * each for each in rows]
         perturbed = objective.perturbed_errors(angle, speed, *more)
-        return np.asarray(weight[:, None] * (perturbed - objective.errors(angle, speed)[:, None]) / _NEIGHBOUR)
+        result = weight[:, None] * (perturbed - objective.errors(angle, speed)[:, None]) / _NEIGHBOUR
+        if not price:
+            return np.asarray(result)
+        return np.concatenate([result, price * guess.scale * excess(objective, speed, rows[1])[1]])
 
     found = least_squares(
-        error,
+        residual,
         np.zeros(size),
         jac=jacobian,
         ftol=_TOLERANCE,
@@ -282,7 +224,7 @@ class _Search:
         self._rng = rng
         self._progress = progress
 
-    def run(self, x: FloatArray, guess: _Guess, name: ObjectiveName, until: int) -> FloatArray:
+    def run(self, x: FloatArray, guess: Guess, name: ObjectiveName, until: int) -> FloatArray:
         """Best variables found from ``x`` before ``until`` evaluations; one unit of scale is a metre of rope."""
         centre, scale, sample = x, guess.scale, guess.sample
         size = len(x)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -15,13 +14,12 @@ from safetensors import SafetensorError
 from safetensors.torch import load as load_tensors
 from safetensors.torch import save as save_tensors
 
-from aframe_env.scenario import Scenario
-from aframe_env.scenario.crane import Crane
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.serialization import strict_converter, structure
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue
-from agents.learned.features import Features, feature_names, features_for
+from agents.learned.feature_policy import OnFeatures
+from agents.learned.features import feature_names
 from agents.learned.network import Actor
 from agents.policy import FloatArray, Knowledge
 
@@ -55,7 +53,7 @@ class AgentCard:
 
 
 @dataclass
-class LearnedPolicy:
+class LearnedPolicy(OnFeatures):
     """An agent as a policy: deterministic, and the same on every batch size."""
 
     actor: Actor
@@ -64,32 +62,15 @@ class LearnedPolicy:
     knows: Knowledge = field(init=False)
 
     def __post_init__(self) -> None:
-        self.name = self.card.algorithm if self.card.observation == "state" else f"{self.card.algorithm} on sensors"
-        self.knows = Knowledge.STATE if self.card.observation == "state" else Knowledge.SENSORS
-        self._quantities = STATE if self.card.observation == "state" else SENSED
-        self._features: Features | None = None
-        self._cranes: Sequence[Crane] = ()
-        expected = feature_names(self._quantities)
+        sensed = self.card.observation != "state"
+        super().__init__(
+            f"{self.card.algorithm} on sensors" if sensed else self.card.algorithm,
+            self.card.sensors,
+            self.card.control_period,
+        )
+        expected = feature_names(SENSED if sensed else STATE)
         if self.card.features != expected:
             raise InvalidValue(f"the agent's features are {self.card.features}, this version makes {expected}")
-
-    def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
-        """Begin N episodes; of the scenarios the agent looks at the crane alone."""
-        if abs(control_period - self.card.control_period) > 1e-9:
-            raise InvalidValue(
-                f"control_period = {control_period} s: the agent was trained for {self.card.control_period} s"
-            )
-        self._cranes = [scenario.crane for scenario in scenarios]
-        self._features = None
-
-    def act(self, observation: npt.NDArray[np.float32], time: float) -> FloatArray:
-        """Drum speed commands (N,) rad/s; the first call since the last reset begins the agent's memory."""
-        if self._features is None:
-            self._features = features_for(len(observation), self.card.control_period, self.card.sensors)
-            inputs = self._features.start(observation, self._cranes)
-        else:
-            inputs = self._features.advance(observation)
-        return self._features.command(self._output(inputs))
 
     def _output(self, inputs: npt.NDArray[np.float32]) -> FloatArray:
         # In blocks of one size: how a matrix product is summed depends on its shape, and a row must not on the others.
@@ -99,22 +80,6 @@ class LearnedPolicy:
         with torch.no_grad():
             blocks = [self.actor(block) for block in torch.split(torch.from_numpy(padded), _BLOCK)]
         return np.asarray(torch.cat(blocks)[:rows, 0].double().numpy())
-
-    def predict(
-        self, observation: npt.NDArray[np.float32], *, first: bool = False, crane: Crane | None = None
-    ) -> npt.NDArray[np.float32]:
-        """Action (1,) rad/s for one observation (K,) of the environment.
-
-        ``first``: an episode's first one, with that ``crane`` (the reference crane by default).
-        """
-        if first or self._features is None:
-            self._features, self._cranes = None, [crane or Crane()]
-        if observation.shape != (len(self._quantities),):
-            raise InvalidValue(
-                f"observation of shape {observation.shape}: must be ({len(self._quantities)},), "
-                f'the environment\'s observation="{self.card.observation}"'
-            )
-        return self.act(observation[None], 0.0).astype(np.float32)
 
 
 def serialise(actor: Actor) -> bytes:

@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from agents.drives.functions import spline_matrices
+from agents.drives.guesses import required_angle
 from agents.drives.objectives import Objective, coarse_step
-from agents.drives.optimisation import required_angle
 from benchmarks.peers.serve import Measurement, serve, speed
 from train.drives.experiment import paper_case
 

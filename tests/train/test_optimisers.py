@@ -7,7 +7,18 @@ from train import optimisers
 
 def test_the_optimisers_stand_side_by_side(tmp_path, monkeypatch):
     out = tmp_path / "out"
-    few = ("--scenarios", "0", "--max-evaluations", "3000", "--workers", "1")
+    few = (
+        "--scenarios",
+        "0",
+        "--max-evaluations",
+        "3000",
+        "--limited",
+        "1",
+        "--limited-evaluations",
+        "60",
+        "--workers",
+        "1",
+    )
     monkeypatch.setattr("sys.argv", ["train.optimisers", *few, "--out", str(out)])
     assert optimisers.main() == 0
     found = json.loads((out / "comparison.json").read_text())
@@ -27,3 +38,4 @@ def test_the_optimisers_stand_side_by_side(tmp_path, monkeypatch):
     assert cells[2:4] == ["18", f"{found[0]['still']:.4g}"]
     assert cells[5] == f"{found[0]['evaluations']:,}"
     assert cells[7] == str(found[1]["evaluations"])
+    assert sum(line.startswith(("| spline, ", "| harmonic, ")) for line in table) == 16

@@ -56,7 +56,7 @@ def run(options: Options, console: Console) -> int:
     for result in experiment.results:
         table.add_row(*result.row.cells)
     console.print(table)
-    write_results(folder, experiment)
+    write_results(folder, experiment, options.free_start)
     winch = scenario.crane.winch
     draw(folder, scenario.target_level, winch.drum_radius, experiment)
     write_text(folder / "notes.md", notes(command, winch, experiment, others, PAPER_DAMPING_RATIO))

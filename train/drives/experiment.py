@@ -13,6 +13,7 @@ from aframe_env.rfem.simulate import Drum, DynamicCase, PrescribedDrum, StillDru
 from aframe_env.scenario import Initial, Scenario
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
 from agents.drives.functions import Drive
+from agents.drives.guesses import required_angle
 from agents.drives.objectives import FINE_STEP, Objective, coarse_step
 from agents.drives.optimisation import (
     FAMILIES,
@@ -22,7 +23,6 @@ from agents.drives.optimisation import (
     ObjectiveName,
     Optimiser,
     optimise,
-    required_angle,
 )
 from agents.drives.optimisation import Progress as SearchProgress
 from agents.policy import FloatArray
@@ -37,13 +37,14 @@ OUTPUT_INTERVAL = 0.01
 PAPER_DAMPING_RATIO = 0.03
 """Damping of the load's bobbing on the rope in ``--case paper``, share of critical: the middle of the range that
 scenarios are drawn from. The paper states no figure."""
-VARIANTS: tuple[tuple[Initial, float], ...] = (
-    ("rest", 0.0),
-    ("rest", 0.05),
-    ("comoving", PAPER_DAMPING_RATIO),
-    ("comoving", 0.0),
+VARIANTS: tuple[tuple[Initial, float, bool], ...] = (
+    ("rest", PAPER_DAMPING_RATIO, True),
+    ("rest", 0.0, False),
+    ("rest", 0.05, False),
+    ("comoving", PAPER_DAMPING_RATIO, False),
+    ("comoving", 0.0, False),
 )
-"""Other starts of the load and rope dampings that the notes show."""
+"""Other starts of the load, rope dampings and starts of the drum (free or not) that the notes show."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +67,9 @@ class Options(RunOptions):
     """Intervals of the spline."""
     harmonics: int = 1
     """Harmonics of the pseudo-harmonic drive."""
+    free_start: bool = False
+    """Take φ_H⁰ and A_0 as decision variables, too, as the paper does: the drum may have moved the load before the
+    start."""
     max_evaluations: int = 20_000
     """Greatest number of evaluations of the objective for each drive."""
     seed: int = 0
@@ -76,6 +80,8 @@ class Options(RunOptions):
     def __post_init__(self) -> None:
         if self.case is not None and self.scenario is not None:
             raise InvalidValue("case, scenario: give one of the two")
+        if self.free_start and self.check is not None:
+            raise InvalidValue("free_start, check: give one of the two: the full model's drum starts at 0")
         require_choice("drive", self.drive, (*FAMILIES, "both"))
         require_choice("objective", self.objective, (*OBJECTIVES, "both"))
         require_choice("optimiser", self.optimiser, OPTIMISERS)
@@ -126,6 +132,7 @@ def solve(scenario: Scenario, options: Options, follow: Callable[[str], SearchPr
                 options.max_evaluations,
                 follow(f"{family[0].upper()}-Ω{name[-1]}"),
                 optimiser=options.optimiser,
+                free_start=options.free_start,
             )
             row = SummaryRow(
                 family,
@@ -175,8 +182,10 @@ def variants(options: Options, bars: Progress) -> list[Variant]:
     """Solve the paper's case with other starts and rope dampings, which the paper does not state."""
     found = []
     bar = bars.add_task("other starts and dampings", total=len(VARIANTS), unit="variants")
-    for initial, ratio in VARIANTS:
-        experiment = solve(paper_case(initial, ratio), options, lambda label: None)
-        found.append(Variant(initial, ratio, experiment.results))
+    for initial, ratio, free in VARIANTS:
+        experiment = solve(
+            paper_case(initial, ratio), replace(options, free_start=free, check=None), lambda label: None
+        )
+        found.append(Variant(initial, ratio, free, experiment.results))
         bars.advance(bar)
     return found

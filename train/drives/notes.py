@@ -17,6 +17,8 @@ class Variant:
 
     initial: str
     damping_ratio: float
+    free_start: bool
+    """Whether φ_H⁰ and A_0 are decision variables."""
     results: Sequence[Result]
 
 
@@ -30,8 +32,10 @@ PAPER = """\
   the 18-interval spline excites the load's bobbing (2.4 s, near the 2 s between its knots), which never dies. A load
   that starts with the deck's velocity, 1.05 m/s, bobs by 0.4 m at once, and no drive of these families stops that.
 - In the paper the spline's value at the start, φ_H⁰ in (35), and the harmonic's constant, A_0 in (36), are decision
-  variables. A drum that starts elsewhere than at 0 has moved the load before the start: the drives here start at
-  φ_H(0) = 0, and have one variable less. The spline ends with no second derivative.
+  variables. A drum that starts elsewhere than at 0 has moved the load before the start, which no episode of the
+  environment knows: the drives here start at φ_H(0) = 0, and have one variable less, unless `--free-start` is given.
+  The load then hangs lower or higher at the start; the variant with a free start shows what that is worth: little.
+  The spline ends with no second derivative.
 - Nelder-Mead (unless the command names another optimiser) starts from the inverse of the geometry and is restarted
   until a round gains less than 0.2 %, where the paper says only that it was used; Ω2 starts from the optimum of Ω1.
 - The simplified model (rigid frame) is optimised on; the drum follows the drive exactly, as in the paper, from a
@@ -106,11 +110,12 @@ def notes(
         rows = [
             (
                 variant.initial,
+                "free" if variant.free_start else "0",
                 f"{variant.damping_ratio:.0%}",
                 *(f"{1e3 * r.row.amplitude:.4g}" for r in variant.results),
             )
             for variant in variants
         ]
-        headings = ("start", "damping, of critical", *(result.row.label for result in results))
+        headings = ("load's start", "drum's start", "damping, of critical", *(result.row.label for result in results))
         text += "\n" + PAPER.format(ratio=damping_ratio) + table(headings, rows)
     return text

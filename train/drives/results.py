@@ -124,8 +124,11 @@ def demand(drive: Drive, times: FloatArray) -> Demand:
     return Demand(float(np.abs(speed).max()), float(np.abs(acceleration).max()), float(speed[0]))
 
 
-def write_results(folder: Path, experiment: Experiment) -> None:
-    """Write summary.json, summary.csv, drives.json (decision variables) and histories.csv."""
+def write_results(folder: Path, experiment: Experiment, free_start: bool) -> None:
+    """Write summary.json, summary.csv, drives.json (decision variables) and histories.csv.
+
+    With a ``free_start`` the first decision variable is φ_H⁰ or A_0.
+    """
     times, results = experiment.times, experiment.results
     rows = [
         asdict(result.row)
@@ -151,6 +154,7 @@ def write_results(folder: Path, experiment: Experiment) -> None:
             "drive": result.row.drive,
             "objective": result.row.objective,
             "duration": result.drive.duration,
+            "free_start": free_start,
             "variables": result.drive.variables.tolist(),
         }
         for result in results

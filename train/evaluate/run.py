@@ -33,6 +33,8 @@ AFTER_TRAINING: Final = (
     "feed-forward + feedback",
     "S-Ω1 for each scenario",
     "H-Ω1 for each scenario",
+    "S-Ω1 for each scenario, Gauss-Newton",
+    "H-Ω1 for each scenario, Gauss-Newton",
 )
 """Policies that an agent is compared with at the end of its training."""
 
@@ -42,9 +44,9 @@ class HeldOut(ScenarioOptions):
     """On what policies are compared: held-out scenarios, a series that training never draws from, and the task."""
 
     bounds: ClassVar[tuple[int, int]] = (1, 20_000)
-    privileged: int = 20
-    """The first so many of them, or all if there are fewer, for the drives that are optimised for each scenario, its
-    whole future known."""
+    privileged: int | None = None
+    """The first so many of them for the drives that are optimised for each scenario, its whole future known; by default
+    all."""
     observation: Literal["state", "sensors"] = "state"
     """Observation of a policy that is made for neither; an agent sees what it was trained on."""
     model: Literal["simplified", "rfem"] = "simplified"
@@ -58,7 +60,7 @@ class HeldOut(ScenarioOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_integer("privileged", self.privileged, low=0, high=10**6)
+        require_integer("privileged", self.privileged or 0, low=0, high=10**6)
         self.config  # noqa: B018 - raises here, before anything is written
 
     @cached_property

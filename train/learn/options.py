@@ -9,6 +9,7 @@ from typing import Literal
 
 from aframe_env.config import TaskConfig
 from aframe_env.validation import require_choice, require_integer, require_number
+from agents.learned.interface import InterfaceConfig
 from train.evaluate.run import HeldOut
 from train.shared.run_folder import RunOptions
 
@@ -41,13 +42,13 @@ class LearningOptions(RunOptions):
     """Discount for a control step: a horizon of two seconds."""
     hidden: int = 64
     """Units of each hidden layer."""
-    horizon: float = 30.0
+    horizon: float = InterfaceConfig.horizon
     """Rows start a new scenario after this time, s."""
-    drift_limit: float = 10.0
+    drift_limit: float = InterfaceConfig.drift_limit
     """Depth error at which a row starts anew, m; its last state's value stands for the rest."""
-    reward_scale: float = 1.0
+    reward_scale: float = InterfaceConfig.reward_scale
     """Reward for a metre of root mean square depth error over a step."""
-    reward_knee: float = 0.05
+    reward_knee: float = InterfaceConfig.reward_knee
     """Depth error beyond which the reward falls with its logarithm only, m: what is learned would otherwise be spent on
     the few loads that drift far off, not on the last centimetres of all others."""
     eval_scenarios: int = 200
@@ -71,8 +72,7 @@ class LearningOptions(RunOptions):
         require_number("gamma", self.gamma, "", low=0.0, high=1.0)
         require_integer("hidden", self.hidden, low=1, high=4096)
         require_number("horizon", self.horizon, "s", low=self.control_period, high=self.episode_duration)
-        require_number("drift_limit", self.drift_limit, "m", low=0.0, high=1e3, low_open=True)
-        require_number("reward_scale", self.reward_scale, "1/m", low=0.0, high=1e6, low_open=True)
+        self.interface  # noqa: B018 - likewise
         require_integer("eval_scenarios", self.eval_scenarios, low=0, high=10**6)
         require_integer("eval_privileged", self.eval_privileged, low=0, high=10**6)
         require_integer("threads", self.threads, low=1, high=256)
@@ -85,6 +85,17 @@ class LearningOptions(RunOptions):
             control_period=self.control_period,
             episode_duration=self.episode_duration,
             observation=self.observation,
+        )
+
+    @cached_property
+    def interface(self) -> InterfaceConfig:
+        """What the rows have on top of the task."""
+        return InterfaceConfig(
+            reward_scale=self.reward_scale,
+            reward_knee=self.reward_knee,
+            drift_limit=self.drift_limit,
+            horizon=self.horizon,
+            privileged=True,
         )
 
     @property

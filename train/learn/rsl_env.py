@@ -1,4 +1,4 @@
-"""The bridge from rows of tensors to rsl_rl, with what training needs on top: the same as in ``bridge``."""
+"""The bridge from rows of tensors to rsl_rl, with what training needs on top, as in ``sb3_env``."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from tensordict import TensorDict
 
 from aframe_env import task
 from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
+from agents.learned.interface import shaped
 from agents.learned.tensor_features import TensorStateFeatures
-from train.learn.sb3_env import median_reduction, shaped
+from train.learn.sb3_env import median_reduction
 
 
 class TrainingRows:

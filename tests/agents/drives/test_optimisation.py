@@ -4,8 +4,9 @@ from scipy.optimize import least_squares
 
 from aframe_env import Harmonic, HarmonicMotion, InvalidValue, Scenario, ScenarioDistribution
 from agents.drives.functions import spline_matrices
+from agents.drives.guesses import required_angle
 from agents.drives.objectives import Objective, coarse_step
-from agents.drives.optimisation import optimise, required_angle
+from agents.drives.optimisation import optimise
 
 
 def paper(damping=1.5e4):

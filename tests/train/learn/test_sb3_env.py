@@ -9,20 +9,16 @@ from aframe_env import ScenarioDistribution
 from aframe_env.config import TaskConfig
 from aframe_env.env import AFrameHeaveEnv
 from agents.learned.features import STATE_FEATURES, features_for
+from agents.learned.interface import InterfaceConfig
 from train.learn import ppo, sac
 from train.learn.sb3_env import TrainingVecEnv
 
 
 def bridge(rows=3, *, horizon=2.0, drift_limit=4.0, reward_scale=1.0, reward_knee=np.inf, seed=5, **task):
-    return TrainingVecEnv(
-        rows,
-        TaskConfig(**task),
-        horizon=horizon,
-        drift_limit=drift_limit,
-        reward_scale=reward_scale,
-        reward_knee=reward_knee,
-        seed=seed,
+    interface = InterfaceConfig(
+        horizon=horizon, drift_limit=drift_limit, reward_scale=reward_scale, reward_knee=reward_knee, privileged=True
     )
+    return TrainingVecEnv(rows, TaskConfig(**task), interface, seed=seed)
 
 
 def test_rows_are_the_environments():

@@ -8,8 +8,8 @@ import pytest
 from aframe_env import Harmonic, HarmonicMotion, Scenario, ScenarioDistribution
 from aframe_env.config import TaskConfig
 from aframe_env.task import SENSED, STATE
+from agents.drives.following import Follower
 from agents.drives.functions import RampedDrive
-from agents.drives.policy import Follower
 from agents.policy import DrumStill, Knowledge
 from agents.rollout import held_out_scenarios, run
 from train.sensitivity import __main__ as sensitivity

@@ -1,0 +1,45 @@
+"""The examples run, and a short training is no worse than the hand-written base by much."""
+
+import inspect
+import re
+from pathlib import Path
+
+import pytest
+
+from agents.learned.features import SENSED_FEATURES
+from examples import learn_cleanrl, learn_sb3
+from train.learn import ppo, sac
+
+PAGE = (Path(__file__).parents[2] / "docs/learners.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("example", [learn_sb3, learn_cleanrl], ids=["sb3", "cleanrl"])
+@pytest.mark.parametrize("observation", ["state", "sensors"])
+def test_an_example_learns(example, observation):
+    assert example.learn(8192, observation, scenarios=4) > 0.8
+
+
+def test_the_example_of_stable_baselines_is_short():
+    assert len(inspect.getsource(learn_sb3).splitlines()) <= 50
+
+
+def test_the_page_names_every_feature():
+    """Those of the full state are among them."""
+    assert sorted(re.findall(r"^\| `(\w+)` \|", PAGE, flags=re.MULTILINE)) == sorted(SENSED_FEATURES)
+
+
+@pytest.mark.parametrize(
+    ("index", "options", "names"),
+    [
+        (0, ppo.Options(), ("n_steps", "n_epochs", "gae_lambda", "clip_range", "reward_scale", "reward_knee")),
+        (1, sac.Options(), ("gradient_steps", "tau", "target_entropy", "learning_starts", "reward_scale")),
+    ],
+    ids=["ppo", "sac"],
+)
+def test_the_page_s_hyperparameters_are_the_options_defaults(index, options, names):
+    block = re.findall(r"```yaml\n(.*?)```", PAGE, flags=re.DOTALL)[index]
+    said = dict(re.findall(r"^ +(?:- )?(\w+): (\S+)$", block, flags=re.MULTILINE))
+    assert said["learning_rate"] == f"lin_{options.learning_rate}"
+    assert said["n_timesteps"] == str(options.timesteps)
+    for name in ("n_envs", "batch_size", "gamma", "drift_limit", "horizon", *names):
+        assert float(said[name]) == getattr(options, name), name
