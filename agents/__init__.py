@@ -2,7 +2,8 @@
 
 from agents.learned.agent import load
 from agents.learned.feature_policy import FeaturePolicy
+from agents.learned.features import FeatureConfig
 from agents.learned.interface import InterfaceConfig
 from agents.learned.wrappers import AgentInterface, AgentVectorInterface
 
-__all__ = ["AgentInterface", "AgentVectorInterface", "FeaturePolicy", "InterfaceConfig", "load"]
+__all__ = ["AgentInterface", "AgentVectorInterface", "FeatureConfig", "FeaturePolicy", "InterfaceConfig", "load"]

@@ -12,15 +12,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, Protocol, TypeVar
+from typing import Any, Final, Literal, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from aframe_env.config import TaskConfig
-from aframe_env.scenario import Scenario, Sensors
+from aframe_env.scenario import Scenario, ScenarioDistribution, Sensors
 from aframe_env.validation import InvalidValue
-from agents.control.feedback import SensorFeedback, StateFeedback
+from agents.control.expected_waves import ExpectedWaves
+from agents.control.feedback import Feedback
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.optimum import CommandSequence, optimise
 from agents.control.predictive import PredictiveControl
@@ -31,6 +32,7 @@ from agents.drives.policy import DrivePolicy
 from agents.drives.realtime_map import RealTimeMapPolicy
 from agents.drives.tuned import TUNED, Tuned, optimised, optimised_as_played
 from agents.learned import agent as learned
+from agents.learned.features import FeatureConfig
 from agents.policy import DrumStill, FloatArray, Knowledge, Policy
 
 Item = TypeVar("Item")
@@ -71,6 +73,11 @@ class BuildContext:
         """Sensors of policies that act on them."""
         return self.config.replaced(observation="sensors").sensors or Sensors()
 
+    @property
+    def waves(self) -> ExpectedWaves:
+        """Motion of the pulley that the task lets expect."""
+        return ExpectedWaves.of(self.config.source)
+
 
 @dataclass(frozen=True)
 class PolicySpec:
@@ -106,16 +113,20 @@ def _drive_for_each(name: str, tuned: Tuned, optimiser: Optimiser = "nelder-mead
     return PolicySpec(name, build, for_each_scenario=True)
 
 
-def _law(make: Callable[[Sensors], Policy]) -> PolicySpec:
-    return PolicySpec(make(Sensors()).name, lambda context: make(context.sensors))
+def _law(make: Callable[[Sensors, ExpectedWaves], Policy]) -> PolicySpec:
+    name = make(Sensors(), ExpectedWaves.of(ScenarioDistribution())).name
+    return PolicySpec(name, lambda context: make(context.sensors, context.waves))
 
 
 def _optimum(context: BuildContext) -> Policy:
     return CommandSequence(OPTIMUM.name, optimise(context.scenarios, context.config).commands)
 
 
-def _output_zero(sees: Callable[[BuildContext], Sensors | None], name: str) -> PolicySpec:
-    return PolicySpec(name, lambda context: learned.output_zero(sees(context), context.config.control_period))
+def _output_zero(observation: Literal["state", "sensors"], name: str) -> PolicySpec:
+    def build(context: BuildContext) -> Policy:
+        return learned.output_zero(FeatureConfig.of(context.config.replaced(observation=observation)))
+
+    return PolicySpec(name, build)
 
 
 DRUM_STILL: Final = PolicySpec("drum still", _drum_still)
@@ -125,12 +136,13 @@ REGISTRY: Final[dict[str, PolicySpec]] = {
     for spec in (
         DRUM_STILL,
         *(_nominal_drive(name, how) for name, how in TUNED.items()),
-        _law(lambda sensors: StateFeedback()),
-        _law(lambda sensors: SensorFeedback(delay=sensors.delay)),
-        _law(lambda sensors: PredictiveControl(sensors=sensors)),
-        _law(lambda sensors: InverseDynamics()),
-        _output_zero(lambda context: None, "output zero"),
-        _output_zero(lambda context: context.sensors, "output zero on sensors"),
+        _law(lambda sensors, waves: Feedback(None)),
+        _law(lambda sensors, waves: Feedback(sensors, waves=waves)),
+        _law(lambda sensors, waves: PredictiveControl(sensors=None, waves=waves)),
+        _law(lambda sensors, waves: PredictiveControl(sensors=sensors, waves=waves)),
+        _law(lambda sensors, waves: InverseDynamics()),
+        _output_zero("state", "output zero"),
+        _output_zero("sensors", "output zero on sensors"),
         OPTIMUM,
         *(_drive_for_each(f"{name} for each scenario", how) for name, how in TUNED.items()),
         *(
@@ -149,11 +161,12 @@ def _agent(folder: Path) -> PolicySpec:
 
 def _map_in_real_time(folder: Path) -> PolicySpec:
     stored = drive_map.load(folder)
-    return _law(lambda sensors: RealTimeMapPolicy(stored, sensors))
+    return _law(lambda sensors, waves: RealTimeMapPolicy(stored, sensors, waves))
 
 
 def _map_on_the_state(folder: Path) -> PolicySpec:
-    return as_spec(RealTimeMapPolicy(drive_map.load(folder), None))
+    stored = drive_map.load(folder)
+    return _law(lambda sensors, waves: RealTimeMapPolicy(stored, None, waves))
 
 
 def _map_by_the_clock(folder: Path) -> PolicySpec:

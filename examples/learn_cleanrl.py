@@ -11,7 +11,7 @@ from torch import nn
 from torch.distributions import Normal
 
 import aframe_env
-from agents import AgentVectorInterface, FeaturePolicy
+from agents import AgentVectorInterface, FeatureConfig, FeaturePolicy
 from agents.policy import DrumStill
 from agents.rollout import held_out_scenarios, run
 
@@ -92,7 +92,9 @@ def learn(
                 nn.utils.clip_grad_norm_(parameters, GRADIENT_LIMIT)
                 optimizer.step()
 
-    policy = FeaturePolicy(lambda features: actor(torch.from_numpy(features)).detach().numpy(), config.sensors)
+    policy = FeaturePolicy(
+        lambda features: actor(torch.from_numpy(features)).detach().numpy(), FeatureConfig.of(config)
+    )
     seas = held_out_scenarios(aframe_env.ScenarioDistribution(), scenarios)
     left = run(policy, seas, observation=observation).rms / run(DrumStill(), seas).rms
     return 1.0 - float(np.median(left))

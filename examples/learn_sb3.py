@@ -8,7 +8,7 @@ import tyro
 from stable_baselines3 import PPO
 
 from aframe_env import ScenarioDistribution, TaskConfig
-from agents import FeaturePolicy
+from agents import FeatureConfig, FeaturePolicy
 from agents.policy import DrumStill
 from agents.rollout import held_out_scenarios, run
 from train.learn.sb3_env import TrainingVecEnv
@@ -36,7 +36,7 @@ def learn(
         device="cpu",
     )
     model.learn(timesteps)
-    policy = FeaturePolicy(lambda features: model.predict(features, deterministic=True)[0], config.sensors)
+    policy = FeaturePolicy(lambda features: model.predict(features, deterministic=True)[0], FeatureConfig.of(config))
     seas = held_out_scenarios(ScenarioDistribution(), scenarios)
     left = run(policy, seas, observation=observation).rms / run(DrumStill(), seas).rms
     return 1.0 - float(np.median(left))

@@ -21,7 +21,7 @@ from scipy.optimize import minimize
 
 from aframe_env import task
 from aframe_env.validation import InvalidValue, require_integer
-from agents.control.feedback import SENSOR_GAINS, STATE_GAINS, SensorFeedback, StateFeedback
+from agents.control.feedback import SENSOR_GAINS, STATE_GAINS, Feedback
 from agents.control.inverse_dynamics import GAINS as INVERSE_GAINS
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.regulator import Gains
@@ -44,8 +44,8 @@ class Tunable:
 
 
 TUNABLE: dict[Name, Tunable] = {
-    "state": Tunable(StateFeedback, "state", STATE_GAINS),
-    "sensors": Tunable(SensorFeedback, "sensors", SENSOR_GAINS),
+    "state": Tunable(lambda gains: Feedback(None, gains), "state", STATE_GAINS),
+    "sensors": Tunable(lambda gains: Feedback(gains=gains), "sensors", SENSOR_GAINS),
     "inverse-dynamics": Tunable(InverseDynamics, "state", INVERSE_GAINS),
 }
 

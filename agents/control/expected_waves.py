@@ -17,7 +17,6 @@ import numpy as np
 
 from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.scenario.motion import Coordinate, has_components, is_tabled
-from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
 from aframe_env.scenario.sea import SeaMotion
 from aframe_env.validation import InvalidValue, require_number
 from agents.control.filters import FloatArray
@@ -86,8 +85,10 @@ def _expected(source: ScenarioSource) -> ExpectedWaves:
     # Smoothed over neighbours: a mean over a few hundred seas still has teeth.
     padded = np.pad(inside, 1, mode="edge")
     smooth = 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
-    total = max(float(smooth.sum()), LEAST_VARIANCE)
-    floored = np.maximum(smooth, FLOOR * total / BANDS)
+    # As much as in a middling sea, not in the mean of all: gains go by the logarithm.
+    each = np.array([line[1].sum() for line in lines])
+    total = float(np.exp(np.log(np.maximum(each, LEAST_VARIANCE)).mean()))
+    floored = np.maximum(smooth / max(float(smooth.sum()), 1e-300), FLOOR / BANDS) * total
     return ExpectedWaves(
         frequency=tuple(middle.tolist()), variance=tuple(floored.tolist()), build_up=float(scenarios[0].ramp)
     )
@@ -121,7 +122,7 @@ def _recorded(rates: FloatArray, x: float, y: float) -> tuple[FloatArray, FloatA
     window = np.hanning(len(signal))
     spectrum = np.fft.rfft(window * (signal - signal.mean()))
     power = 2.0 * np.square(np.abs(spectrum)) / (len(signal) * np.square(window).sum())
-    return 2.0 * np.pi * np.fft.rfftfreq(len(signal), _SAMPLING), power
+    return np.asarray(2.0 * np.pi * np.fft.rfftfreq(len(signal), _SAMPLING)), power
 
 
 def _band(frequency: FloatArray, variance: FloatArray) -> tuple[float, float]:

@@ -5,10 +5,10 @@ For a trajectory of n control steps, find the changes w_k of its inputs that mak
     Σ c_end (e_k+1 + x_k+1[0])² + c_mid (m_k + middle · x_k + β_k w_k)² + ρ w_k²  +  (x̄ + x_n)ᵀ P (x̄ + x_n)
 
 least, where x_k+1 = A x_k + b_k w_k, x_0 = 0, with |u_k + w_k| ≤ U_k and |v_k + x_k+1[3]| ≤ V: e and m are the nominal
-errors at the ends and in the middles of the steps, u the nominal inputs, v the nominal values of the limited state,
-x̄ the nominal last state, and ρ keeps the change short. Mehrotra's predictor and corrector (SIAM J. Optim. 2, 1992); the normal equations are banded,
-and a backward and a forward pass solve them (Rao, Wright and Rawlings, J. Optim. Theory Appl. 99, 1998): the time grows
-with n only. All problems of a batch are solved side by side over the cores.
+errors at the ends and in the middles of the steps, u the nominal inputs, v the nominal values of the limited state, x̄
+the nominal last state, and ρ keeps the change short. Mehrotra's predictor and corrector (SIAM J. Optim. 2, 1992); the
+normal equations are banded, and a backward and a forward pass solve them (Rao, Wright and Rawlings, J. Optim. Theory
+Appl. 99, 1998): the time grows with n only. All problems of a batch are solved side by side over the cores.
 """
 
 from __future__ import annotations
@@ -69,8 +69,9 @@ class BoundedTracking:
 
     def rows(self, which: npt.NDArray[np.int64]) -> BoundedTracking:
         """The problems of some rows."""
-        chosen = {each.name: getattr(self, each.name) for each in fields(self)}
-        return replace(self, **{k: v[which] for k, v in chosen.items() if isinstance(v, np.ndarray)})
+        arrays = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "weights"}
+        chosen: dict[str, Any] = {k: None if v is None else v[which] for k, v in arrays.items()}
+        return replace(self, **chosen)
 
     def solve(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
         """Changes w (N, n) of the inputs, and how many iterations each problem took."""

@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.scenario.sensors import Sensors
-from agents.control.filters import ALL, FloatArray, Rows
 from agents.control.expected_waves import ExpectedWaves
+from agents.control.filters import ALL, FloatArray, Rows
 from agents.control.rope import RopeModel
 
 LEAST_RATE_NOISE: Final = 0.001
@@ -184,7 +184,8 @@ class WaveFilter:
         factors = self._foretelling(ahead.tobytes(), rises.tobytes(), delay)
         # As real numbers in one product. A row's sum does not depend on the others: each is a sum of its own.
         state = self._state[rows, :-1]
-        return np.einsum("fb,nb->fn", factors.real, state.real) - np.einsum("fb,nb->fn", factors.imag, state.imag)
+        turned = np.einsum("fb,nb->fn", factors.imag, state.imag)
+        return np.asarray(np.einsum("fb,nb->fn", factors.real, state.real) - turned)
 
     def _foretelling(self, ahead: bytes, rises: bytes, delay: float) -> ComplexArray:
         key = (ahead, rises, delay)
@@ -205,7 +206,7 @@ ACCELERATION_NOISE = 0.02
 
 
 class RopeFilter:
-    """The load on its rope, x = (e, v, q, b) of N rows: depth error, its rate, where the rope's end would hold it, bias.
+    """The load on its rope, x = (e, v, q, b) of N rows: depth error, its rate, where the rope's end would hold it.
 
     Only e - q and v are of use: q is dead-reckoned and drifts. The bias b is that of a reading of the stretch: the
     load's weight is what the first reading of the tension said, noise and all.

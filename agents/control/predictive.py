@@ -14,11 +14,11 @@ import numpy as np
 
 from aframe_env.scenario import Scenario, ScenarioDistribution
 from aframe_env.scenario.sensors import Sensors
-from aframe_env.task import SENSED
+from aframe_env.task import SENSED, STATE
 from aframe_env.validation import require_integer, require_number
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.interior_point import BoundedTracking
-from agents.control.observer import KalmanObserver
+from agents.control.observer import Observer, observer_for
 from agents.control.regulator import HoistBatch, Observation
 from agents.control.rope import RopeModel
 from agents.policy import FloatArray, Knowledge
@@ -26,30 +26,32 @@ from agents.policy import FloatArray, Knowledge
 
 @dataclass
 class PredictiveControl:
-    """Model-predictive control on the sensors; the agents' Kalman filters predict the motion."""
+    """Model-predictive control; the agents' Kalman filters predict the motion."""
 
     effort: float = 0.026
     """Weight on changes of the rope end's speed, s²; that of the feedback law beside it."""
-    horizon: int = 25
+    horizon: int = 50
     """Control steps."""
     damping_ratio: float = 0.03
     """Damping of the load's bobbing on the rope that the law is designed for, share of critical."""
-    sensors: Sensors = field(default_factory=Sensors)
-    """Delay and noise that the law is designed for."""
+    sensors: Sensors | None = field(default_factory=Sensors)
+    """Delay and noise that the law is designed for; None for the full state, which has neither."""
     waves: ExpectedWaves = field(default_factory=lambda: ExpectedWaves.of(ScenarioDistribution()))
     """Motion that it is designed for."""
-    name: str = "predictive control"
-    knows: Knowledge = field(init=False, default=Knowledge.SENSORS)
+    name: str = field(init=False)
+    knows: Knowledge = field(init=False)
     _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
     _period: float = field(init=False, repr=False, default=0.1)
     _hoists: HoistBatch | None = field(init=False, repr=False, default=None)
     _model: RopeModel = field(init=False, repr=False)
     _k: FloatArray = field(init=False, repr=False)
     _cost_to_go: FloatArray = field(init=False, repr=False)
-    _observer: KalmanObserver = field(init=False, repr=False)
+    _observer: Observer = field(init=False, repr=False)
     _turned: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        self.knows = Knowledge.STATE if self.sensors is None else Knowledge.SENSORS
+        self.name = "predictive control (state)" if self.sensors is None else "predictive control"
         require_number("effort", self.effort, "s²", low=1e-8, high=1e8)
         require_integer("horizon", self.horizon, low=2, high=1000)
         require_number("damping_ratio", self.damping_ratio, "of critical", low=0.0, high=1.0)
@@ -59,11 +61,12 @@ class PredictiveControl:
         self._scenarios, self._period, self._hoists = scenarios, control_period, None
 
     def act(self, observation: Observation, time: float) -> FloatArray:
-        """Drum speed commands (N,) rad/s for readings (N, 10)."""
+        """Drum speed commands (N,) rad/s for readings (N, 10), or observations (N, 14) of the full state."""
         if self._hoists is None:
-            hoists = self._hoists = HoistBatch(len(observation), self._period, SENSED)
+            quantities = STATE if self.sensors is None else SENSED
+            hoists = self._hoists = HoistBatch(len(observation), self._period, quantities)
             o = hoists.start([s.crane for s in self._scenarios], observation)
-            self._observer = KalmanObserver(hoists, self.damping_ratio, self.sensors, self.waves)
+            self._observer = observer_for(hoists, self.damping_ratio, self.sensors, self.waves)
             self._observer.start(o)
             self._model = self._observer.model
             self._k = self._model.gains(self.effort)

@@ -87,6 +87,7 @@ class HoistBatch:
     """Winches, loads and ropes of N rows, as far as a policy may know them from crane and observation."""
 
     def __init__(self, rows: int, control_period: float, quantities: tuple[Quantity, ...]) -> None:
+        """``quantities`` of the observations."""
         self.period = control_period
         self.winch = WinchModel(rows, control_period)
         self._columns = {q.name: i for i, q in enumerate(quantities)}

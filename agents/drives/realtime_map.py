@@ -10,15 +10,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.scenario import Scenario
+from aframe_env.scenario import Scenario, ScenarioDistribution
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
+from agents.control.expected_waves import ExpectedWaves
 from agents.control.kalman import WaveBank, WaveFilter
 from agents.control.regulator import Columns, HoistBatch, Observation
 from agents.control.winch import WinchModel
@@ -27,8 +28,6 @@ from agents.policy import FloatArray, Knowledge
 
 LOOKUP_PERIOD: Final = 1.0
 """Time between two looks at the map, s."""
-LEAST_RATE_NOISE: Final = 0.001
-"""Least standard deviation of a reading of the heave rate that the filter reckons with, m/s."""
 ENCODER_GAIN: Final = 0.1
 """Share of its deviation from the encoder's reading that the reckoned drum angle is corrected by at each step."""
 BRAKING_SHARE: Final = 0.25
@@ -48,12 +47,14 @@ class RealTimeMapPolicy:
     drive_map: DriveMap
     sensors: Sensors | None = field(default_factory=Sensors)
     """Sensors that it acts on, for their delay and noise; None for the full state, which has neither."""
+    waves: ExpectedWaves = field(default_factory=lambda: ExpectedWaves.of(ScenarioDistribution()))
+    """Motion of the pulley that its filter expects."""
     name: str = field(init=False)
     knows: Knowledge = field(init=False)
     _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
     _period: float = field(init=False, repr=False, default=0.1)
     _hoists: HoistBatch | None = field(init=False, repr=False, default=None)
-    _waves: WaveFilter = field(init=False, repr=False)
+    _bank: WaveFilter = field(init=False, repr=False)
     _drums: _Drums = field(init=False, repr=False)
     _ratio: npt.NDArray[np.complex128] = field(init=False, repr=False)
     """(N, bands) rope paid out over heave."""
@@ -81,7 +82,7 @@ class RealTimeMapPolicy:
             self._start(self._hoists.winch, o)
         else:
             o = self._hoists.columns(observation)
-            self._waves.advance(o["pulley_velocity_z"])
+            self._bank.advance(o["pulley_velocity_z"])
             self._drums.advance(o)
         if self._step % max(1, round(LOOKUP_PERIOD / period)) == 0:
             self._look_up(o)
@@ -92,28 +93,28 @@ class RealTimeMapPolicy:
         """Drum angles (T, N) rad since the start that the map asks for, ``times`` (T,) s from now."""
         assert self._hoists is not None
         delay = 0.0 if self.sensors is None else self.sensors.delay
-        growth = np.exp(np.outer(times + delay, self._waves.exponents))
+        growth = np.exp(np.outer(times + delay, self._bank.exponents))
         # Row by row in the same order, whatever the batch: a sum, not a matrix product.
-        rope = (growth[:, None, :] * (self._ratio * self._waves.phasors())[None]).real.sum(axis=2)
+        rope = (growth[:, None, :] * (self._ratio * self._bank.phasors())[None]).real.sum(axis=2)
         return np.asarray(rope / self._hoists.winch.radius)
 
     def _start(self, winch: WinchModel, o: Columns) -> None:
-        rate_noise = 0.0 if self.sensors is None else self.sensors.heave_rate.noise
         # The load's depth is not read: a reading of endless noise counts for nothing.
-        bank = WaveBank(rate_noise=max(LEAST_RATE_NOISE, rate_noise), depth_noise=math.inf)
-        self._waves = WaveFilter(len(winch.radius), self._period, 1, bank)
-        self._waves.start()
+        bank = replace(WaveBank.of(self.waves, self.sensors), depth_noise=math.inf)
+        self._bank = WaveFilter(len(winch.radius), self._period, 1, bank)
+        self._bank.start()
         self._drums = _Drums(winch, self._period, self.sensors, o)
         self._step = 0
 
     def _look_up(self, o: Columns) -> None:
-        phasors, frequency = self._waves.phasors(), self._waves.exponents.imag
+        assert self._hoists is not None
+        phasors, frequency = self._bank.phasors(), self._bank.exponents.imag
         # A harmonic of a sea goes with the amplitude of the whole, as in ``DriveMap.drive``.
         amplitude = np.sqrt(np.square(np.abs(phasors)).sum(axis=1))
         self._ratio = self.drive_map.ratio_at(
             np.broadcast_to(amplitude[:, None], phasors.shape),
             np.broadcast_to(2.0 * np.pi / frequency, phasors.shape),
-            np.broadcast_to(o["load_mass"][:, None], phasors.shape),
+            np.broadcast_to(self._hoists.mass[:, None], phasors.shape),
             np.broadcast_to(o["rope_length"][:, None], phasors.shape),
         )
 

@@ -16,14 +16,14 @@ from safetensors.torch import save as save_tensors
 
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.serialization import strict_converter, structure
-from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue
+from agents.control.expected_waves import ExpectedWaves
 from agents.learned.feature_policy import OnFeatures
-from agents.learned.features import feature_names
+from agents.learned.features import FEATURES, Action, FeatureConfig
 from agents.learned.network import Actor
 from agents.policy import FloatArray, Knowledge
 
-FORMAT = 2
+FORMAT = 3
 WEIGHTS = "agent.safetensors"
 CARD = "agent.json"
 _BLOCK = 64
@@ -38,6 +38,10 @@ class AgentCard:
     """"state" or "sensors"."""
     sensors: Sensors | None
     """The sensors that it was trained with."""
+    waves: ExpectedWaves
+    """The motion that its filters expect."""
+    action: Action
+    """What its output is, see ``FeatureConfig``."""
     features: tuple[str, ...]
     hidden: int
     control_period: float
@@ -50,6 +54,13 @@ class AgentCard:
     squashed: bool = False
     """True if the action passes through tanh instead of being clipped."""
     format: int = FORMAT
+
+    @property
+    def made_for(self) -> FeatureConfig:
+        """What its features are made for."""
+        return FeatureConfig(
+            control_period=self.control_period, sensors=self.sensors, waves=self.waves, action=self.action
+        )
 
 
 @dataclass
@@ -65,12 +76,10 @@ class LearnedPolicy(OnFeatures):
         sensed = self.card.observation != "state"
         super().__init__(
             f"{self.card.algorithm} on sensors" if sensed else self.card.algorithm,
-            self.card.sensors,
-            self.card.control_period,
+            self.card.made_for,
         )
-        expected = feature_names(SENSED if sensed else STATE)
-        if self.card.features != expected:
-            raise InvalidValue(f"the agent's features are {self.card.features}, this version makes {expected}")
+        if self.card.features != FEATURES:
+            raise InvalidValue(f"the agent's features are {self.card.features}, this version makes {FEATURES}")
 
     def _output(self, inputs: npt.NDArray[np.float32]) -> FloatArray:
         # In blocks of one size: how a matrix product is summed depends on its shape, and a row must not on the others.
@@ -133,22 +142,24 @@ def load(folder: str | Path) -> LearnedPolicy:
     return LearnedPolicy(actor, card)
 
 
-def output_zero(sensors: Sensors | None, control_period: float) -> LearnedPolicy:
+def output_zero(config: FeatureConfig) -> LearnedPolicy:
     """Return an agent whose network says nothing: the hand-written base of all agents, alone.
 
-    ``sensors``: those it acts on, or None for the full state. What a trained agent removes beyond this is learned.
+    What a trained agent removes beyond this is learned.
     """
-    features = feature_names(STATE if sensors is None else SENSED)
-    actor = Actor(len(features), 1)
+    sensors = config.sensors
+    actor = Actor(len(FEATURES), 1)
     for parameter in actor.parameters():
         torch.nn.init.zeros_(parameter)
     card = AgentCard(
         algorithm="output zero",
         observation="state" if sensors is None else "sensors",
         sensors=sensors,
-        features=features,
+        waves=config.waves,
+        action=config.action,
+        features=FEATURES,
         hidden=1,
-        control_period=control_period,
+        control_period=config.control_period,
         seed=0,
         timesteps=0,
         versions={},

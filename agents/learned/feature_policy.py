@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario
 from aframe_env.scenario.crane import Crane
-from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue, require_numbers
-from agents.learned.features import Features, features_for
+from agents.learned.features import FeatureConfig, Features
 from agents.policy import FloatArray, Knowledge
 
 Float32Array = npt.NDArray[np.float32]
@@ -27,12 +25,10 @@ class OnFeatures(ABC):
     name: str
     knows: Knowledge
 
-    def __init__(self, name: str, sensors: Sensors | None, control_period: float) -> None:
-        """``sensors``: those that it acts on, or None for the full state; ``control_period`` [s]: that it is for."""
+    def __init__(self, name: str, config: FeatureConfig) -> None:
         self.name = name
-        self.knows = Knowledge.SENSORS if sensors else Knowledge.STATE
-        self._sensors = sensors
-        self._control_period = control_period
+        self.knows = Knowledge.SENSORS if config.sensors else Knowledge.STATE
+        self._config = config
         self._features: Features | None = None
         self._cranes: Sequence[Crane] = ()
 
@@ -42,17 +38,16 @@ class OnFeatures(ABC):
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes; of the scenarios the policy looks at the crane alone."""
-        if abs(control_period - self._control_period) > 1e-9:
-            raise InvalidValue(
-                f"control_period = {control_period} s: the agent was trained for {self._control_period} s"
-            )
+        trained = self._config.control_period
+        if abs(control_period - trained) > 1e-9:
+            raise InvalidValue(f"control_period = {control_period} s: the agent was trained for {trained} s")
         self._cranes = [scenario.crane for scenario in scenarios]
         self._features = None
 
     def act(self, observation: Float32Array, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s; the first call since the last reset begins the features' memory."""
         if self._features is None:
-            self._features = features_for(len(observation), self._control_period, self._sensors)
+            self._features = Features(len(observation), self._config)
             inputs = self._features.start(observation, self._cranes)
         else:
             inputs = self._features.advance(observation)
@@ -65,7 +60,7 @@ class OnFeatures(ABC):
         """
         if first or self._features is None:
             self._features, self._cranes = None, [crane or Crane()]
-        quantities, name = (SENSED, "sensors") if self._sensors else (STATE, "state")
+        quantities, name = (SENSED, "sensors") if self._config.sensors else (STATE, "state")
         if observation.shape != (len(quantities),):
             raise InvalidValue(
                 f"observation of shape {observation.shape}: must be ({len(quantities)},), "
@@ -80,13 +75,15 @@ class FeaturePolicy(OnFeatures):
     def __init__(
         self,
         function: Callable[[Float32Array], Any],
-        sensors: Sensors | None = None,
-        control_period: float = TaskConfig.control_period,
+        config: FeatureConfig | None = None,
         *,
         name: str = "on features",
     ) -> None:
-        """``function``: features (N, F) → outputs (N,) or (N, 1), clipped to [-1, 1]."""
-        super().__init__(name, sensors, control_period)
+        """``function``: features (N, F) → outputs (N,) or (N, 1), clipped to [-1, 1].
+
+        ``config``: what the features are made for; by default the full state of the default task.
+        """
+        super().__init__(name, config or FeatureConfig())
         self._function = function
 
     def _output(self, inputs: Float32Array) -> FloatArray:

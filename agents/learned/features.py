@@ -11,25 +11,27 @@ speed action there is nothing below the network, and the output is the drum's sp
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from aframe_env.config import TaskConfig
+from aframe_env.scenario import ScenarioDistribution
 from aframe_env.scenario.crane import Crane
 from aframe_env.scenario.sensors import Sensors
-from aframe_env.task import SENSED, STATE, Quantity
-from aframe_env.validation import InvalidValue
+from aframe_env.task import SENSED, STATE
+from aframe_env.validation import require_choice
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import ALL, FloatArray, Rows
-from agents.control.kalman import WaveBank, WaveFilter
-from agents.control.observer import KalmanObserver
+from agents.control.observer import observer_for
 from agents.control.regulator import GRID, Columns, Gains, HoistBatch, Observation, gain_table, regulated_speed
 
 Float32Array = npt.NDArray[np.float32]
 Action = Literal["residual", "speed"]
+ACTIONS: Final = ("residual", "speed")
 
 LIMIT = 20.0
 """Features are clipped to ± this."""
@@ -46,13 +48,15 @@ STATE_REGULATOR = Gains(effort=0.01, share=0.02)
 SENSED_REGULATOR = Gains(effort=0.03, share=0.02)
 """And on sensors."""
 
-PRESENT = (
+PRESENT: Final = (
     "depth_error",
     "depth_error_near_zero",
     "load_velocity_z",
     "stretch_deviation",
     "rope_end_speed",
     "regulator",
+    "drum_speed_share",
+    "wanted_speed_change",
     "pulley_velocity_z",
     "pulley_acceleration_z",
     "pulley_heave",
@@ -61,174 +65,63 @@ PRESENT = (
     "bobbing_rate",
     "max_rope_speed",
     "max_rope_acceleration",
-    "drum_speed_share",
-    "wanted_speed_change",
 )
-FORETOLD = (
+FORETOLD: Final = (
     *(f"pulley_velocity_z_in_{t:g}_s" for t in AHEAD),
     *(f"pulley_rise_in_{t:g}_s" for t in RISES),
 )
-STATE_FEATURES = (*PRESENT, *FORETOLD)
-SENSED_FEATURES = (*STATE_FEATURES, "heave_rate_innovation")
+FEATURES: Final = (*PRESENT, *FORETOLD, "heave_rate_innovation")
+"""Names of the features, the same on sensors and on the full state."""
 
 
-def feature_names(quantities: tuple[Quantity, ...]) -> tuple[str, ...]:
-    """Names of the features of an observation with these quantities."""
-    if quantities == STATE:
-        return STATE_FEATURES
-    if quantities == SENSED:
-        return SENSED_FEATURES
-    raise InvalidValue(f"no features for an observation of {[q.name for q in quantities]}")
+@dataclass(frozen=True, kw_only=True)
+class FeatureConfig:
+    """What features are made for."""
+
+    control_period: float = TaskConfig.control_period
+    """s."""
+    sensors: Sensors | None = None
+    """Sensors that measure the observation; None where the full state is observed."""
+    waves: ExpectedWaves = field(default_factory=lambda: ExpectedWaves.of(ScenarioDistribution()))
+    """Motion of the pulley that is expected."""
+    action: Action = "residual"
+    """"residual": the output moves the rope's end, above a feed-forward that follows the pulley; "speed": it is the
+    drum's speed, as a share of the winch's."""
+
+    def __post_init__(self) -> None:
+        require_choice("action", self.action, ACTIONS)
+
+    @classmethod
+    def of(cls, task: TaskConfig, action: Action = "residual") -> FeatureConfig:
+        """For the agents of a task."""
+        return cls(
+            control_period=task.control_period,
+            sensors=task.sensors,
+            waves=ExpectedWaves.of(task.source),
+            action=action,
+        )
 
 
-class Features(ABC):
+class Features:
     """Features of N rows, and what their outputs ask of the winches."""
 
-    names: tuple[str, ...]
-
-    def __init__(self, hoists: HoistBatch, action: Action, gains: Gains) -> None:
-        self._hoists, self._action, self._gains = hoists, action, gains
-        self._table = gain_table(gains.damping_ratio, gains.effort, hoists.period)
-        self._k = np.zeros((4, len(hoists.mass)))
+    def __init__(self, rows: int, config: FeatureConfig) -> None:
+        self._action = config.action
+        quantities, self._gains = (STATE, STATE_REGULATOR) if config.sensors is None else (SENSED, SENSED_REGULATOR)
+        self._hoists = hoists = HoistBatch(rows, config.control_period, quantities)
+        self._observer = observer_for(hoists, self._gains.damping_ratio, config.sensors, config.waves)
+        self._table = gain_table(self._gains.damping_ratio, self._gains.effort, hoists.period)
+        self._k = np.zeros((4, rows))
         """Gains of the regulator."""
-        self._rise = np.zeros(len(hoists.mass))
-        """Rise of the pulley during the coming control step, (N,) m."""
-
-    @abstractmethod
-    def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
-        """Features (n, F) of the first observations (n, K) of these ``rows``, whose past is forgotten."""
-
-    @abstractmethod
-    def advance(self, observation: Observation) -> Float32Array:
-        """Features (N, F) of all rows, whose observations (N, K) are one control step later."""
-
-    def command(self, output: FloatArray) -> FloatArray:
-        """Drum speed commands (N,) rad/s for a network's output (N,), in [-1, 1]."""
-        winch, period = self._hoists.winch, self._hoists.period
-        if self._action == "speed":
-            return self._speed(np.clip(output, -1.0, 1.0) * winch.max_speed)
-        return self._turn(wanted_turn(np, self._rise, output, winch.radius, winch.max_acceleration, period))
-
-    @abstractmethod
-    def _turn(self, turn: FloatArray) -> FloatArray:
-        """Commands (N,) rad/s that turn the drums by ``turn`` (N,) rad, as nearly as may be."""
-
-    @abstractmethod
-    def _speed(self, speed: FloatArray) -> FloatArray:
-        """Commands (N,) rad/s, which these are; take note of what they do."""
-
-    def _start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows) -> Columns:
-        o = self._hoists.start(cranes, observation, rows)
-        frequency = self._hoists.frequency[rows]
-        self._k[:, rows] = [np.interp(frequency, GRID, line) for line in self._table]
-        return o
-
-    def _stacked(
-        self,
-        o: Columns,
-        rows: Rows,
-        z: Sequence[FloatArray],
-        pulley: Sequence[FloatArray],
-        foretold: FloatArray,
-    ) -> Float32Array:
-        """Features (n, F) in the order of the names, from the rope's state z, 4 of (n,), and what is foretold.
-
-        ``pulley``: its velocity and acceleration now, each (n,).
-        """
-        hoists, winch = self._hoists, self._hoists.winch
-        acceleration = self._gains.share * winch.radius[rows] * winch.max_acceleration[rows]
-        amplitude = acceleration / hoists.frequency[rows] ** 2
-        up = regulated_speed(np, self._k[:, rows], amplitude, acceleration, z)
-        of_the_load = (
-            *load_features(np, z[0], z[1], z[2] - z[0], z[3]),
-            output_for(np, up, winch.radius[rows], winch.max_acceleration[rows]),
-            *pulley,
-        )
-        of_the_lift = lift_features(
-            o["pulley_heave"],
-            hoists.mass[rows],
-            o["rope_length"],
-            hoists.frequency[rows],
-            winch.radius[rows],
-            winch.max_speed[rows],
-            winch.max_acceleration[rows],
-            winch.speed[rows],
-            self._rise[rows] / hoists.period,
-            hoists.period,
-            np,
-        )
-        features = np.stack([*of_the_load, *of_the_lift, *foretold], axis=1)
-        return np.asarray(np.clip(features, -LIMIT, LIMIT), dtype=np.float32)
-
-
-class StateFeatures(Features):
-    """Features of N rows that observe the full state."""
-
-    names = STATE_FEATURES
-
-    def __init__(self, rows: int, control_period: float, waves: ExpectedWaves, action: Action = "residual") -> None:
-        super().__init__(HoistBatch(rows, control_period, STATE), action, STATE_REGULATOR)
-        self._waves = WaveFilter(rows, control_period, 1, WaveBank.of(waves, None))
+        self._rise, self._turned = np.zeros((2, rows))
+        """Rise of the pulleys [m] and turn of the drums [rad] in this control step."""
 
     def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
         """Features (n, F) of the first observations (n, K) of these ``rows``, whose past is forgotten."""
-        o = self._start(observation, cranes, rows)
-        self._waves.start(rows)
-        return self._look(o, rows)
-
-    def advance(self, observation: Observation) -> Float32Array:
-        """Features (N, F) of all rows, whose observations (N, K) are one control step later."""
-        o = self._hoists.columns(observation)
-        self._waves.advance(o["pulley_velocity_z"])
-        return self._look(o, ALL)
-
-    def _turn(self, turn: FloatArray) -> FloatArray:
-        return self._hoists.winch.invert(turn)
-
-    def _speed(self, speed: FloatArray) -> FloatArray:
-        return speed
-
-    def _look(self, o: Columns, rows: Rows) -> Float32Array:
         hoists = self._hoists
-        hoists.winch.speed[rows] = o["drum_speed"]
-        self._rise[rows] = coming_rise(o, hoists.period)
-        return self._stacked(
-            o,
-            rows,
-            (
-                o["depth_error"],
-                o["load_velocity_z"],
-                o["depth_error"] + hoists.stretch(o, rows),
-                o["pulley_velocity_z"] - hoists.winch.radius[rows] * o["drum_speed"],
-            ),
-            (o["pulley_velocity_z"], o["pulley_acceleration_z"]),
-            self._waves.foretold(np.array(AHEAD), np.array(RISES), rows),
-        )
-
-
-class SensedFeatures(Features):
-    """Features of N rows that have sensors: estimates of the present from the readings and the commands since."""
-
-    names = SENSED_FEATURES
-
-    def __init__(
-        self,
-        rows: int,
-        control_period: float,
-        waves: ExpectedWaves,
-        sensors: Sensors,
-        action: Action = "residual",
-    ) -> None:
-        super().__init__(HoistBatch(rows, control_period, SENSED), action, SENSED_REGULATOR)
-        self._observer = KalmanObserver(self._hoists, SENSED_REGULATOR.damping_ratio, sensors, waves)
-        self._delay = control_period * round(sensors.delay / control_period)
-        self._turned = np.zeros(rows)
-        """Turn of the drums in this control step, rad."""
-
-    def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
-        """Features (n, F) of the first observations (n, K) of these ``rows``, whose past is forgotten."""
-        o = self._start(observation, cranes, rows)
+        o = hoists.start(cranes, observation, rows)
         self._observer.start(o, rows)
+        self._k[:, rows] = [np.interp(hoists.frequency[rows], GRID, line) for line in self._table]
         return self._look(o, rows)
 
     def advance(self, observation: Observation) -> Float32Array:
@@ -237,103 +130,119 @@ class SensedFeatures(Features):
         self._observer.advance(self._turned, o)
         return self._look(o, ALL)
 
-    def _turn(self, turn: FloatArray) -> FloatArray:
-        command, self._turned = self._hoists.winch.command(turn)
+    def command(self, output: FloatArray) -> FloatArray:
+        """Drum speed commands (N,) rad/s for a network's output (N,), in [-1, 1]."""
+        winch, period = self._hoists.winch, self._hoists.period
+        if self._action == "speed":
+            command = np.clip(output, -1.0, 1.0) * winch.max_speed
+            self._turned = winch.turn(command)
+            return command
+        turn = wanted_turn(np, self._rise, output, winch.radius, winch.max_acceleration, period)
+        command, self._turned = winch.command(turn)
         return command
 
-    def _speed(self, speed: FloatArray) -> FloatArray:
-        self._turned = self._hoists.winch.turn(speed)
-        return speed
-
     def _look(self, o: Columns, rows: Rows) -> Float32Array:
-        hoists, observer = self._hoists, self._observer
+        hoists, winch, observer = self._hoists, self._hoists.winch, self._observer
         self._rise[rows] = observer.rises(1)[0, rows]
-        velocity = observer.pulley_velocity(2)[:, rows]
-        foretold = observer.waves.foretold(np.array(AHEAD), np.array(RISES), rows, self._delay)
-        return self._stacked(
-            o,
-            rows,
-            list(observer.state()[rows].T),
-            (velocity[0], (velocity[1] - velocity[0]) / hoists.period),
-            np.concatenate([foretold, 10.0 * observer.waves.innovation[None, rows]]),
+        velocity, acceleration = observer.pulley()
+        hoist = HoistFeatures(
+            mass=hoists.mass[rows],
+            rope_length=o["rope_length"],
+            frequency=hoists.frequency[rows],
+            max_rope_speed=winch.radius[rows] * winch.max_speed[rows],
+            max_rope_acceleration=winch.radius[rows] * winch.max_acceleration[rows],
+            k=self._k[:, rows],
+            share=self._gains.share,
+            period=hoists.period,
         )
-
-
-def features_for(
-    rows: int,
-    control_period: float,
-    sensors: Sensors | None,
-    waves: ExpectedWaves,
-    action: Action = "residual",
-) -> Features:
-    """Features of N rows with these sensors; None where the full state is observed."""
-    if sensors is None:
-        return StateFeatures(rows, control_period, waves, action)
-    return SensedFeatures(rows, control_period, waves, sensors, action)
+        of_the_load = hoist.of_the_load(np, observer.state()[rows].T)
+        of_the_pulley = velocity[rows], acceleration[rows], 0.5 * o["pulley_heave"]
+        rope_speed = winch.radius[rows] * winch.speed[rows]
+        of_the_winch = hoist.of_the_winch(np, rope_speed, self._rise[rows] / hoists.period)
+        foretold = observer.waves.foretold(np.array(AHEAD), np.array(RISES), rows, observer.delay)
+        features = np.stack(
+            [
+                *of_the_load,
+                *of_the_winch,
+                *of_the_pulley,
+                *hoist.constant(),
+                *foretold,
+                10.0 * observer.waves.innovation[rows],
+            ],
+            axis=1,
+        )
+        return np.asarray(np.clip(features, -LIMIT, LIMIT), dtype=np.float32)
 
 
 # For arrays of numpy (``xp`` = numpy) and tensors of torch (``xp`` = torch) alike, all (N,).
 
 
-def load_features(xp: Any, depth_error: Any, velocity: Any, stretch: Any, rope_end_speed: Any) -> tuple[Any, ...]:
-    """The first of PRESENT, not clipped yet; ``stretch`` of the ropes beyond that under the loads' weight, m."""
-    return (
-        # Beyond some metres only the side of the error: there the agent does what it has learned nearer.
-        4.0 * xp.tanh(0.5 * depth_error),
-        2.0 * xp.tanh(10.0 * depth_error),
-        5.0 * velocity,
-        20.0 * stretch,
-        10.0 * rope_end_speed,
-    )
+@dataclass(frozen=True, kw_only=True)
+class HoistFeatures:
+    """Features of loads, ropes and winches, not clipped yet."""
+
+    mass: Any
+    """kg."""
+    rope_length: Any
+    """m."""
+    frequency: Any
+    """Of the loads' bobbing, rad/s."""
+    max_rope_speed: Any
+    """m/s."""
+    max_rope_acceleration: Any
+    """m/s²."""
+    k: Any
+    """(4, N) gains of the regulator."""
+    share: float
+    """Share of the winch's acceleration that the regulator may use."""
+    period: float
+    """Control step, s."""
+
+    def of_the_load(self, xp: Any, z: Any) -> tuple[Any, ...]:
+        """The first of PRESENT, from the rope's state z, 4 of (N,)."""
+        acceleration = self.share * self.max_rope_acceleration
+        up = regulated_speed(xp, self.k, acceleration / self.frequency**2, acceleration, z)
+        return (
+            # Beyond some metres only the side of the error: there the agent does what it has learned nearer.
+            4.0 * xp.tanh(0.5 * z[0]),
+            2.0 * xp.tanh(10.0 * z[0]),
+            5.0 * z[1],
+            20.0 * (z[2] - z[0]),
+            10.0 * z[3],
+            output_for(xp, up, self.max_rope_acceleration),
+        )
+
+    def of_the_winch(self, xp: Any, rope_speed: Any, pulley_speed: Any) -> tuple[Any, ...]:
+        """The next ones, from the speed of the rope at the drum, and the pulley's in the coming control step, m/s."""
+        change = (pulley_speed - rope_speed) / (self.max_rope_acceleration * self.period)
+        return rope_speed / self.max_rope_speed, 4.0 * xp.tanh(0.5 * change)
+
+    def constant(self) -> tuple[Any, ...]:
+        """The last ones, which are the same all along an episode, but for the rope's length."""
+        return (
+            self.mass / 5.0e4 - 1.2,
+            self.rope_length / 1.0e3 - 0.8,
+            0.25 * self.frequency - 1.0,
+            self.max_rope_speed - 2.0,
+            self.max_rope_acceleration - 1.0,
+        )
 
 
-def lift_features(
-    pulley_heave: Any,
-    mass: Any,
-    rope_length: Any,
-    frequency: Any,
-    radius: Any,
-    max_speed: Any,
-    max_acceleration: Any,
-    drum_speed: Any,
-    pulley_speed: Any,
-    period: float,
-    xp: Any,
-) -> tuple[Any, ...]:
-    """The last of PRESENT, not clipped yet.
-
-    ``frequency`` of the loads' bobbing and the drums' speeds and limits in rad/s, rad/s²; mean ``pulley_speed`` in the
-    coming control step, m/s.
-    """
-    change = (pulley_speed - radius * drum_speed) / (radius * max_acceleration * period)
-    return (
-        0.5 * pulley_heave,
-        mass / 5.0e4 - 1.2,
-        rope_length / 1.0e3 - 0.8,
-        0.25 * frequency - 1.0,
-        radius * max_speed - 2.0,
-        radius * max_acceleration - 1.0,
-        drum_speed / max_speed,
-        4.0 * xp.tanh(0.5 * change),
-    )
+def rope_speed(output: Any, max_rope_acceleration: Any) -> Any:
+    """Speed m/s at which the rope's end is to go up for a network's ``output`` in [-1, 1]."""
+    return max_rope_acceleration * output * (AUTHORITY + (FAR_AUTHORITY - AUTHORITY) * output * output)
 
 
-def coming_rise(o: Mapping[str, Any], period: float) -> Any:
-    """Rise of the pulleys during a coming control step of ``period`` s, m, as the full state tells."""
-    return period * (o["pulley_velocity_z"] + 0.5 * period * o["pulley_acceleration_z"])
+def output_for(xp: Any, up: Any, max_rope_acceleration: Any) -> Any:
+    """Output in [-1, 1] at which the rope's end goes up at ``up`` m/s, or as near as may be: inverse of the above."""
+    # The real root of (F - A) x³ + A x = y, by Cardano's formula in its hyperbolic form, which loses no digits near 0.
+    y = xp.clip(up / max_rope_acceleration, -FAR_AUTHORITY, FAR_AUTHORITY)
+    p = AUTHORITY / (FAR_AUTHORITY - AUTHORITY)
+    scale = 2.0 * math.sqrt(p / 3.0)
+    return scale * xp.sinh(xp.arcsinh(4.0 * y / (scale**3 * (FAR_AUTHORITY - AUTHORITY))) / 3.0)
 
 
 def wanted_turn(xp: Any, rise: Any, output: Any, radius: Any, max_acceleration: Any, period: float) -> Any:
     """Turn of the drums, rad, while the pulleys ``rise`` m, for a network's ``output`` in [-1, 1]."""
-    output = xp.clip(output, -1.0, 1.0)
-    up = max_acceleration * radius * output * (AUTHORITY + (FAR_AUTHORITY - AUTHORITY) * output * output)
+    up = rope_speed(xp.clip(output, -1.0, 1.0), radius * max_acceleration)
     return (rise - period * up) / radius
-
-
-def output_for(xp: Any, up: Any, radius: Any, max_acceleration: Any) -> Any:
-    """Output in [-1, 1] at which the rope's end goes up at ``up`` m/s, or as near as may be: inverse of the above."""
-    # The real root of (F - A) x³ + A x = y, by Cardano's formula in its hyperbolic form, which loses no digits near 0.
-    y = xp.clip(up / (max_acceleration * radius), -FAR_AUTHORITY, FAR_AUTHORITY)
-    p = AUTHORITY / (FAR_AUTHORITY - AUTHORITY)
-    scale = 2.0 * math.sqrt(p / 3.0)
-    return scale * xp.sinh(xp.arcsinh(4.0 * y / (scale**3 * (FAR_AUTHORITY - AUTHORITY))) / 3.0)

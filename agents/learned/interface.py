@@ -17,11 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.scenario.crane import Crane
-from aframe_env.scenario.sensors import Sensors
 from aframe_env.validation import InvalidValue, require_choice, require_number
 from agents.control.filters import ALL, FloatArray, Rows
 from agents.control.regulator import Observation
-from agents.learned.features import STATE_FEATURES, StateFeatures, features_for
+from agents.learned.features import ACTIONS, FEATURES, Action, FeatureConfig, Features
 
 Float32Array = npt.NDArray[np.float32]
 
@@ -32,6 +31,8 @@ REWARDS: Final = ("training", "task")
 class InterfaceConfig:
     """What a learner's rows have on top of the environment; the defaults are those of the shipped agents' training."""
 
+    action: Action = "residual"
+    """As in ``FeatureConfig``."""
     reward: Literal["training", "task"] = "training"
     """"training": minus the root mean square of the depth error over the step, see ``shaped``; "task": the
     environment's own, minus the integral of its square, m² s."""
@@ -49,6 +50,7 @@ class InterfaceConfig:
     """Append, where sensors are observed, the features of the full state, for critics alone."""
 
     def __post_init__(self) -> None:
+        require_choice("action", self.action, ACTIONS)
         require_choice("reward", self.reward, REWARDS)
         require_number("reward_scale", self.reward_scale, "1/m", low=0.0, high=1e6, low_open=True)
         if self.reward_knee != math.inf:
@@ -86,16 +88,16 @@ def shaped(xp: Any, mean_square: Any, scale: float, knee: float) -> Any:
 class LearnerFeatures:
     """Features of N rows as a learner observes them: the agent's, then those that are for critics alone."""
 
-    def __init__(self, rows: int, control_period: float, sensors: Sensors | None, *, privileged: bool) -> None:
-        """``sensors``: those observed, or None for the full state; ``privileged``: as in ``InterfaceConfig``."""
-        self._features = features_for(rows, control_period, sensors)
-        self._privileged = StateFeatures(rows, control_period) if privileged and sensors else None
-        self.actor_inputs = len(self._features.names)
+    def __init__(self, rows: int, config: FeatureConfig, *, privileged: bool) -> None:
+        """``privileged``: as in ``InterfaceConfig``."""
+        self._features = Features(rows, config)
+        self._privileged = Features(rows, replace(config, sensors=None)) if privileged and config.sensors else None
+        self.actor_inputs = len(FEATURES)
         """Number of features that are the agent's, the first ones."""
-        self.names: tuple[str, ...] = self._features.names
+        self.names: tuple[str, ...] = FEATURES
         """Names of all features; those for critics begin with "true_"."""
         if self._privileged:
-            self.names += tuple(f"true_{name}" for name in STATE_FEATURES)
+            self.names += tuple(f"true_{name}" for name in FEATURES)
         self.values = np.zeros((rows, len(self.names)), dtype=np.float32)
         """The present features (N, F), in place."""
 

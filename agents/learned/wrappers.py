@@ -18,7 +18,7 @@ from aframe_env.simulation import Simulation
 from aframe_env.validation import InvalidValue, require_numbers
 from aframe_env.vector_env import AFrameHeaveVectorEnv
 from agents.control.filters import FloatArray
-from agents.learned.features import LIMIT
+from agents.learned.features import LIMIT, FeatureConfig
 from agents.learned.interface import Cuts, InterfaceConfig, LearnerFeatures, interface_config
 
 Float32Array = npt.NDArray[np.float32]
@@ -202,8 +202,8 @@ def _bare(env: gymnasium.Env[Any, Any] | VectorEnv[Any, Any, Any], kind: type[Fa
 
 
 def _features(simulation: Simulation, config: InterfaceConfig) -> LearnerFeatures:
-    sensors = simulation.config.sensors
-    return LearnerFeatures(simulation.rows, simulation.control_period, sensors, privileged=config.privileged)
+    made_for = FeatureConfig.of(simulation.config, config.action)
+    return LearnerFeatures(simulation.rows, made_for, privileged=config.privileged)
 
 
 def _observation_space(features: LearnerFeatures) -> spaces.Box:

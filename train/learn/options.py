@@ -9,6 +9,7 @@ from typing import Literal
 
 from aframe_env.config import TaskConfig
 from aframe_env.validation import require_choice, require_integer, require_number
+from agents.learned.features import ACTIONS, Action, FeatureConfig
 from agents.learned.interface import InterfaceConfig
 from train.evaluate.run import HeldOut
 from train.shared.run_folder import RunOptions
@@ -28,6 +29,9 @@ class LearningOptions(RunOptions):
     """Train so many agents, with seeds one after another, each in a folder of its own."""
     observation: Literal["state", "sensors"] = "state"
     """Observation of the agent."""
+    action: Action = "residual"
+    """What the network's output is: "residual" moves the rope's end, above a hand-written feed-forward that follows the
+    pulley; "speed" is the drum's speed, with nothing below it."""
     scenarios: Path | None = None
     """A TOML file with a scenario or a distribution of your own to learn from; by default the package's seas."""
     control_period: float = TaskConfig.control_period
@@ -65,6 +69,7 @@ class LearningOptions(RunOptions):
         require_integer("seed", self.seed, low=0, high=2**32 - 1)
         require_integer("seeds", self.seeds, low=1, high=10_000)
         require_choice("observation", self.observation, ("state", "sensors"))
+        require_choice("action", self.action, ACTIONS)
         require_number("control_period", self.control_period, "s", low=0.01, high=2.0)
         self.config  # noqa: B018 - raises here, before anything is written
         require_integer("batch_size", self.batch_size, low=2, high=10**9)
@@ -88,9 +93,15 @@ class LearningOptions(RunOptions):
         )
 
     @cached_property
+    def features(self) -> FeatureConfig:
+        """What the agent's features are made for."""
+        return FeatureConfig.of(self.config, self.action)
+
+    @cached_property
     def interface(self) -> InterfaceConfig:
         """What the rows have on top of the task."""
         return InterfaceConfig(
+            action=self.action,
             reward_scale=self.reward_scale,
             reward_knee=self.reward_knee,
             drift_limit=self.drift_limit,

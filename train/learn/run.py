@@ -13,7 +13,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, serialise
-from agents.learned.features import feature_names
+from agents.learned.features import FEATURES
 from train.evaluate.run import evaluate
 from train.learn.learner import Learner, LearnerSpec, Rows
 from train.learn.options import LearningOptions
@@ -54,10 +54,12 @@ def to_policy(learner: Learner, options: LearningOptions) -> tuple[LearnedPolicy
     actor = learner.to_actor()
     weights = serialise(actor)
     card = AgentCard(
-        algorithm=learner.algorithm,
+        algorithm=learner.algorithm if options.action == "speed" else f"residual {learner.algorithm}",
         observation=options.observation,
-        sensors=options.config.sensors,
-        features=feature_names(learner.rows.quantities),
+        sensors=options.features.sensors,
+        waves=options.features.waves,
+        action=options.action,
+        features=FEATURES,
         hidden=options.hidden,
         squashed=actor.squashed,
         control_period=options.control_period,

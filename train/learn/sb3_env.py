@@ -18,7 +18,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from aframe_env import task
 from aframe_env.config import TaskConfig
 from aframe_env.simulation import Simulation
-from agents.learned.features import LIMIT
+from agents.learned.features import LIMIT, FeatureConfig
 from agents.learned.interface import Cuts, InterfaceConfig, LearnerFeatures
 from train.learn.options import LearningOptions
 
@@ -51,7 +51,7 @@ class TrainingVecEnv(VecEnv):
         self._commands = np.zeros(rows)
         self._no_infos: list[dict[str, Any]] = [{} for _ in range(rows)]
         self._features = LearnerFeatures(
-            rows, simulation.control_period, simulation.config.sensors, privileged=interface.privileged
+            rows, FeatureConfig.of(simulation.config, interface.action), privileged=interface.privileged
         )
         self._cuts = Cuts(rows, simulation.control_period, simulation.episode_duration, interface)
         super().__init__(
