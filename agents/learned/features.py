@@ -141,13 +141,26 @@ class Features:
         command, self._turned = winch.command(turn)
         return command
 
-    def _look(self, o: Columns, rows: Rows) -> Float32Array:
-        hoists, winch, observer = self._hoists, self._hoists.winch, self._observer
-        self._rise[rows] = observer.rises(1)[0, rows]
-        velocity, acceleration = observer.pulley()
-        hoist = HoistFeatures(
+    @property
+    def rope_state(self) -> FloatArray:
+        """State z (N, 4) of the rope's model, as it is reckoned with now."""
+        return self._observer.state()
+
+    @property
+    def pulley_speed(self) -> FloatArray:
+        """Mean speed (N,) m/s of the pulleys in the coming control step, as it is reckoned with."""
+        return np.asarray(self._rise / self._hoists.period)
+
+    @property
+    def hoist(self) -> HoistFeatures:
+        """Loads, ropes and winches of all rows, as they are reckoned with."""
+        return self._hoist(ALL, np.zeros(len(self._rise)))
+
+    def _hoist(self, rows: Rows, rope_length: FloatArray) -> HoistFeatures:
+        hoists, winch = self._hoists, self._hoists.winch
+        return HoistFeatures(
             mass=hoists.mass[rows],
-            rope_length=o["rope_length"],
+            rope_length=rope_length,
             frequency=hoists.frequency[rows],
             max_rope_speed=winch.radius[rows] * winch.max_speed[rows],
             max_rope_acceleration=winch.radius[rows] * winch.max_acceleration[rows],
@@ -155,6 +168,12 @@ class Features:
             share=self._gains.share,
             period=hoists.period,
         )
+
+    def _look(self, o: Columns, rows: Rows) -> Float32Array:
+        hoists, winch, observer = self._hoists, self._hoists.winch, self._observer
+        self._rise[rows] = observer.rises(1)[0, rows]
+        velocity, acceleration = observer.pulley()
+        hoist = self._hoist(rows, o["rope_length"])
         of_the_load = hoist.of_the_load(np, observer.state()[rows].T)
         of_the_pulley = velocity[rows], acceleration[rows], 0.5 * o["pulley_heave"]
         rope_speed = winch.radius[rows] * winch.speed[rows]
