@@ -162,9 +162,9 @@ def rollout(actor: Actor, recording: Recording) -> tuple[torch.Tensor, torch.Ten
     reach = r.max_rope_acceleration * period
     own = [FEATURES.index(name) for name in OWN]
     others = [i for i in range(len(FEATURES)) if i not in own]
-    hidden = actor.perceptron[0].out_features
-    assert isinstance(hidden, int)
-    into, bias, head = actor.perceptron[0].weight, actor.perceptron[0].bias, actor.head.weight[0]
+    first, second = actor.perceptron[0], actor.perceptron[2]
+    assert isinstance(first, torch.nn.Linear)
+    hidden, into, bias, head = first.out_features, first.weight, first.bias, actor.head.weight[0]
     # What the recording adds to the first layer and to the linear path: of all control steps at once.
     into_hidden = (r.features[..., others] @ into[:, others].T + bias).unbind(1)
     into_output = (r.features[..., others] @ head[hidden:][others] + actor.head.bias).unbind(1)
@@ -186,12 +186,12 @@ def rollout(actor: Actor, recording: Recording) -> tuple[torch.Tensor, torch.Ten
     drum = torch.clamp(speed[0], -r.max_rope_speed, r.max_rope_speed)
     cost, beyond = torch.zeros(len(r.still)), torch.zeros(())
     for step in range(len(rise)):
-        x, drum = _Gentle.apply(x, drum)
+        x, drum = _Gentle.apply(x, drum)  # type: ignore[no-untyped-call]
         off = misjudged[step]
         z = (*(x + off[:, :3]).unbind(1), speed[step] - drum + off[:, 3])
         mine = torch.stack([*hoist.of_the_load(torch, z), *hoist.of_the_winch(torch, drum, pulley_speed[step])], 1)
         mine = torch.clamp(mine, -LIMIT, LIMIT)
-        latent = torch.tanh(actor.perceptron[2](torch.tanh(into_hidden[step] + mine @ own_hidden)))
+        latent = torch.tanh(second(torch.tanh(into_hidden[step] + mine @ own_hidden)))
         output = into_output[step] + mine @ own_output + latent @ hidden_output
         beyond = beyond + torch.clamp(output.abs() - 1.0, min=0.0).square().mean()
         bounded = torch.clamp(output, -1.0, 1.0)
