@@ -140,7 +140,9 @@ class TwoPathPolicy(ActorCriticPolicy):
 
     def freeze_actor(self, frozen: bool) -> None:
         """Keep the actor as it is, or let it learn."""
-        for parameter in (*self.mlp_extractor.actor.parameters(), *self.action_net.parameters(), self.log_std):
+        latent = self.mlp_extractor.actor
+        assert isinstance(latent, ActorLatent)
+        for parameter in (*latent.parameters(), *self.action_net.parameters(), self.log_std):
             parameter.requires_grad_(not frozen)
 
     def to_actor(self) -> Actor:
