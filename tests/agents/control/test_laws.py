@@ -6,12 +6,17 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import solve_discrete_are
 
 from aframe_env import Crane, Harmonic, HarmonicMotion, InvalidValue, Scenario, ScenarioDistribution, Sensors, Winch
-from agents.control.feedback import SensorFeedback, StateFeedback
+from aframe_env.task import SENSED, STATE
+from agents.control.expected_waves import ExpectedWaves
+from agents.control.feedback import Feedback
 from agents.control.inverse_dynamics import InverseDynamics, RequiredRope
+from agents.control.predictive import PredictiveControl
 from agents.control.regulator import Gains
 from agents.control.rope import RopeModel
 from agents.control.winch import WinchModel
 from agents.drives.objectives import Objective
+from agents.learned.agent import output_zero
+from agents.learned.features import FeatureConfig
 from agents.policy import DrumStill
 from agents.rollout import held_out_scenarios, run
 
@@ -21,6 +26,10 @@ HEAVE = HarmonicMotion(harmonics=(Harmonic(coordinate="heave", amplitude=1.0, pe
 
 def sinusoid(**changes):
     return Scenario(motion=HEAVE, load_mass=60.0e3, rope_damping=2.0e4, ramp=10.0, **changes)
+
+
+def on_the_state():
+    return Feedback(None)
 
 
 def test_the_rope_model_is_the_solution_of_its_differential_equation():
@@ -95,7 +104,7 @@ def test_a_command_turns_the_drum_as_far_as_wanted(lag):
 def test_feed_forward_cancels_a_sinusoidal_heave():
     """The drum's speed is s'/r, and the load stands still to within the winch's steps."""
     scenario = sinusoid()
-    episodes = run(StateFeedback(), [scenario], episode_duration=60.0)
+    episodes = run(Feedback(None), [scenario], episode_duration=60.0)
     times = PERIOD * np.arange(601)
     full = times > 11.0
     w = 2.0 * np.pi / 9.0
@@ -106,7 +115,7 @@ def test_feed_forward_cancels_a_sinusoidal_heave():
     assert abs(run(DrumStill(), [scenario], episode_duration=60.0).error[0]).max() > 0.9
 
 
-@pytest.mark.parametrize(("policy", "observation"), [(StateFeedback, "state"), (InverseDynamics, "state")])
+@pytest.mark.parametrize(("policy", "observation"), [(on_the_state, "state"), (InverseDynamics, "state")])
 def test_what_a_sudden_start_stirs_is_calmed(policy, observation):
     """The ship moves at once, the load is at rest: the regulator has to calm what that stirs, and not keep it up."""
     scenario = dataclasses.replace(
@@ -136,7 +145,7 @@ def test_required_rope_holds_the_load_without_feedback():
 
 @pytest.mark.parametrize(
     ("policy", "observation", "least"),
-    [(StateFeedback, "state", 0.99), (InverseDynamics, "state", 0.99), (SensorFeedback, "sensors", 0.95)],
+    [(on_the_state, "state", 0.99), (InverseDynamics, "state", 0.99), (Feedback, "sensors", 0.95)],
 )
 def test_policies_act_alike_alone_and_in_a_batch_and_remove_the_heave(policy, observation, least):
     scenarios = held_out_scenarios(ScenarioDistribution(), 12)
@@ -152,7 +161,7 @@ def test_the_delay_is_bridged(delay):
     """Ideal sensors, only late: the prediction makes good what a pure delay would leave, 2 sin(π τ / T)."""
     scenario = sinusoid()
     sensors = dataclasses.replace(Sensors.ideal(), delay=delay)
-    episodes = run(SensorFeedback(delay=delay), [scenario], observation=sensors, episode_duration=60.0)
+    episodes = run(Feedback(sensors), [scenario], observation=sensors, episode_duration=60.0)
     still = run(DrumStill(), [scenario], episode_duration=60.0)
     left = episodes.rms[0] / still.rms[0]
     assert left < 0.02
@@ -164,8 +173,91 @@ def test_the_winchs_limits_are_survived():
     motion = HarmonicMotion(harmonics=(Harmonic(coordinate="heave", amplitude=3.0, period=6.0),))
     scenario = dataclasses.replace(sinusoid(), motion=motion)
     still = run(DrumStill(), [scenario], episode_duration=60.0)
-    for policy, observation in ((StateFeedback(), "state"), (SensorFeedback(), "sensors")):
+    for policy, observation in ((Feedback(None), "state"), (Feedback(), "sensors")):
         assert run(policy, [scenario], observation=observation).rms[0] < still.rms[0]
+
+
+SENSED_LAWS = {
+    "feedback": Feedback,
+    "predictive control": PredictiveControl,
+    "output zero on sensors": lambda: output_zero(FeatureConfig(sensors=Sensors())),
+}
+STATE_LAWS = {
+    "feedback": on_the_state,
+    "predictive control": lambda: PredictiveControl(sensors=None),
+    "output zero": lambda: output_zero(FeatureConfig()),
+}
+
+
+class Misinformed:
+    """A policy that is told another mass of the load."""
+
+    def __init__(self, policy, observation, factor):
+        self.name, self.knows = policy.name, policy.knows
+        self._policy, self._factor = policy, factor
+        quantities = SENSED if observation == "sensors" else STATE
+        self._column = [quantity.name for quantity in quantities].index("load_mass")
+
+    def reset(self, scenarios, control_period):
+        self._policy.reset(scenarios, control_period)
+
+    def act(self, observation, time):
+        told = observation.copy()
+        told[:, self._column] *= self._factor
+        return self._policy.act(told, time)
+
+
+@pytest.mark.parametrize(
+    ("make", "observation"),
+    [*((make, "sensors") for make in SENSED_LAWS.values()), *((make, "state") for make in STATE_LAWS.values())],
+    ids=[*SENSED_LAWS, *(f"{name} (state)" for name in STATE_LAWS)],
+)
+def test_the_told_mass_is_of_no_account(make, observation):
+    """The load is weighed: 20 % more or less on the manifest changes not a bit."""
+    scenarios = held_out_scenarios(ScenarioDistribution(), 4)
+    plain, low, high = (
+        run(Misinformed(make(), observation, factor), scenarios, observation=observation, episode_duration=15.0)
+        for factor in (1.0, 0.8, 1.2)
+    )
+    assert plain.error.any()
+    for told in (low, high):
+        np.testing.assert_array_equal(told.error, plain.error)
+        np.testing.assert_array_equal(told.drum_speed, plain.drum_speed)
+
+
+@pytest.mark.parametrize("make", SENSED_LAWS.values(), ids=SENSED_LAWS)
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+def test_a_load_pin_that_is_off_by_a_tenth_is_borne(make, factor):
+    scenarios = held_out_scenarios(ScenarioDistribution(), 12)
+    column = [quantity.name for quantity in SENSED].index("rope_tension")
+
+    class Pinned(Misinformed):
+        def act(self, observation, time):
+            told = observation.copy()
+            told[:, column] *= factor
+            return self._policy.act(told, time)
+
+    still = run(DrumStill(), scenarios)
+    off = run(Pinned(make(), "sensors", factor), scenarios, observation="sensors")
+    assert np.median(1.0 - off.rms / still.rms) > 0.95
+
+
+@pytest.mark.parametrize("name", SENSED_LAWS)
+def test_a_ship_that_moves_already_costs_little(name):
+    """Told that it does, the filters make do with what the first readings say."""
+    def left(source):
+        waves = ExpectedWaves.of(source)
+        policy = {
+            "feedback": lambda: Feedback(waves=waves),
+            "predictive control": lambda: PredictiveControl(waves=waves),
+            "output zero on sensors": lambda: output_zero(FeatureConfig(sensors=Sensors(), waves=waves)),
+        }[name]()
+        scenarios = held_out_scenarios(source, 24)
+        still = run(DrumStill(), scenarios)
+        return run(policy, scenarios, observation="sensors").rms / still.rms
+
+    gently, at_once = (np.median(left(ScenarioDistribution(ramp=ramp))) for ramp in (ScenarioDistribution().ramp, 0.0))
+    print("RAMP", name, gently, at_once)
 
 
 def test_bad_input_is_refused():
@@ -174,4 +266,4 @@ def test_bad_input_is_refused():
     with pytest.raises(InvalidValue, match="share = 2"):
         Gains(effort=1.0, share=2.0)
     with pytest.raises(InvalidValue, match="the policy reads 14"):
-        run(StateFeedback(), held_out_scenarios(ScenarioDistribution(), 1), observation="sensors")
+        run(Feedback(None), held_out_scenarios(ScenarioDistribution(), 1), observation="sensors")
