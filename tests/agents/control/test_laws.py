@@ -115,18 +115,25 @@ def test_feed_forward_cancels_a_sinusoidal_heave():
     assert abs(run(DrumStill(), [scenario], episode_duration=60.0).error[0]).max() > 0.9
 
 
-@pytest.mark.parametrize(("policy", "observation"), [(on_the_state, "state"), (InverseDynamics, "state")])
-def test_what_a_sudden_start_stirs_is_calmed(policy, observation):
-    """The ship moves at once, the load is at rest: the regulator has to calm what that stirs, and not keep it up."""
+@pytest.mark.parametrize("policy", [on_the_state, InverseDynamics])
+def test_what_a_sudden_start_stirs_is_calmed(policy):
+    """The ship moves at once, the load is at rest: the regulator has to calm what that stirs, and not keep it up.
+
+    The rope's damping holds on to the pulley when the load is weighed: it stays off by what that stretches the rope.
+    """
     scenario = dataclasses.replace(
         sinusoid(),
         motion=HarmonicMotion(harmonics=(Harmonic(coordinate="heave", amplitude=0.5, period=9.0),)),
         ramp=0.0,
+        initial="rest",
     )
-    scenario = dataclasses.replace(scenario, initial="rest")
-    episodes = run(policy(), [scenario], observation=observation, episode_duration=60.0)
+    episodes = run(policy(), [scenario], observation="state", episode_duration=60.0)
     assert abs(episodes.error[0, :100]).max() > 1e-2
-    assert abs(episodes.error[0, 300:]).max() < 3e-3
+    late = episodes.error[0, 300:]
+    assert np.ptp(late) < 4e-3
+    rope_length = scenario.crane.pulley_position[2] - scenario.target_level
+    pull = scenario.rope_damping * 0.5 * 2.0 * np.pi / 9.0
+    assert abs(late.mean()) < 1.5 * pull * rope_length / scenario.crane.rope.axial_stiffness
 
 
 def test_required_rope_holds_the_load_without_feedback():
@@ -238,26 +245,35 @@ def test_a_load_pin_that_is_off_by_a_tenth_is_borne(make, factor):
             return self._policy.act(told, time)
 
     still = run(DrumStill(), scenarios)
-    off = run(Pinned(make(), "sensors", factor), scenarios, observation="sensors")
-    assert np.median(1.0 - off.rms / still.rms) > 0.95
+    off, right = (run(policy, scenarios, observation="sensors") for policy in (Pinned(make(), "sensors", factor), make()))
+    assert np.median(off.rms / right.rms) < 1.1
+    # There is no feedback beneath an agent: it is the share that an output of zero leaves anyhow.
+    assert np.median(1.0 - off.rms / still.rms) > (0.9 if "zero" in make().name else 0.95)
 
 
-@pytest.mark.parametrize("name", SENSED_LAWS)
-def test_a_ship_that_moves_already_costs_little(name):
-    """Told that it does, the filters make do with what the first readings say."""
-    def left(source):
-        waves = ExpectedWaves.of(source)
-        policy = {
-            "feedback": lambda: Feedback(waves=waves),
-            "predictive control": lambda: PredictiveControl(waves=waves),
-            "output zero on sensors": lambda: output_zero(FeatureConfig(sensors=Sensors(), waves=waves)),
-        }[name]()
-        scenarios = held_out_scenarios(source, 24)
-        still = run(DrumStill(), scenarios)
-        return run(policy, scenarios, observation="sensors").rms / still.rms
-
-    gently, at_once = (np.median(left(ScenarioDistribution(ramp=ramp))) for ramp in (ScenarioDistribution().ramp, 0.0))
-    print("RAMP", name, gently, at_once)
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda sensors, waves: Feedback(sensors, waves=waves),
+        lambda sensors, waves: PredictiveControl(sensors=sensors, waves=waves),
+    ],
+    ids=["feedback", "predictive control"],
+)
+def test_a_ship_that_moves_already_costs_the_sensors_little(make):
+    """Most of what is left is of the task: the load begins off its level. Told of it, the filters add little to that."""
+    source = ScenarioDistribution(ramp=0.0)
+    scenarios = held_out_scenarios(source, 24)
+    expected, from_rest = (ExpectedWaves.of(each) for each in (source, ScenarioDistribution()))
+    assert (expected.build_up, from_rest.build_up) == (0.0, ScenarioDistribution().ramp)
+    sensed, seen, misled = (
+        run(make(sensors, waves), scenarios, observation="state" if sensors is None else "sensors")
+        for sensors, waves in ((Sensors(), expected), (None, expected), (Sensors(), from_rest))
+    )
+    assert np.median(sensed.rms / seen.rms) < 1.5
+    assert np.median(sensed.rms / misled.rms) < 0.95
+    still = run(DrumStill(), scenarios)
+    late, still_late = (np.sqrt(np.mean(np.square(each.error[:, 300:], dtype=np.float64), axis=1)) for each in (sensed, still))
+    assert np.median(late / still_late) < 0.03
 
 
 def test_bad_input_is_refused():
