@@ -39,7 +39,7 @@ class WaveBank:
     rate_noise: float
     """Standard deviation of a reading of the heave rate, m/s."""
     depth_noise: float
-    """Standard deviation of a reading of the depth, m."""
+    """Standard deviation of a reading of the depth, m; infinite where the depth is never read."""
     damping: float = 0.002
     """Rate at which an oscillator forgets, 1/s."""
     offset_drift: float = 1e-7
@@ -47,9 +47,9 @@ class WaveBank:
 
     @classmethod
     def of(cls, waves: ExpectedWaves, sensors: Sensors | None) -> WaveBank:
-        """Bank for readings of these sensors; None for exact ones."""
+        """Bank for readings of these sensors; None for an exact heave rate alone, with which no depth is read."""
         if sensors is None:
-            return cls(waves=waves, rate_noise=LEAST_RATE_NOISE, depth_noise=LEAST_DEPTH_NOISE)
+            return cls(waves=waves, rate_noise=LEAST_RATE_NOISE, depth_noise=math.inf)
         rate, depth = sensors.heave_rate, sensors.depth_error
         return cls(
             waves=waves,

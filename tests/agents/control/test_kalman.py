@@ -1,13 +1,18 @@
 """The filters against Gaussian conditioning on all readings at once: the same estimate without any recursion."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
+from aframe_env.scenario.sensors import Sensors
+from agents.control.expected_waves import ExpectedWaves
 from agents.control.kalman import ACCELERATION_NOISE, RopeFilter, WaveBank, WaveFilter
 from agents.control.rope import RopeModel
 
 PERIOD = 0.1
+WAVES = ExpectedWaves(frequency=(0.5, 0.8, 1.3), variance=(0.02, 0.2, 0.07), build_up=1.0)
 
 
 def conditioned(a, start, stirs, rows, readings, noises):
@@ -26,37 +31,50 @@ def conditioned(a, start, stirs, rows, readings, noises):
     return gain @ np.concatenate(readings)
 
 
-def test_the_wave_filter_is_the_conditional_mean():
-    bank, hold, steps = WaveBank(bands=3, build_up=1.0, damping=0.05, offset_drift=1e-4), 5, 23
+@pytest.mark.parametrize("build_up", [1.0, 0.0], ids=["from rest", "moves already"])
+def test_the_wave_filter_is_the_conditional_mean(build_up):
+    waves = replace(WAVES, build_up=build_up)
+    bank = WaveBank(waves=waves, rate_noise=0.012, depth_noise=0.05, damping=0.05, offset_drift=1e-4)
+    variance = np.array(WAVES.variance)
+    hold, steps = 5, 23
     rng = np.random.default_rng(2)
     rates, depths = rng.normal(0.0, 0.5, steps), rng.normal(0.0, 0.3, steps)
-    waves = WaveFilter(2, PERIOD, hold, bank)
-    frequency = np.linspace(bank.lowest, bank.highest, 3)
-    exponent = -bank.damping + 1j * frequency
+    filtered = WaveFilter(2, PERIOD, hold, bank)
+    exponent = -bank.damping + 1j * np.array(WAVES.frequency)
     a = block_diag(*[np.exp(z.real * PERIOD) * rotation(z.imag * PERIOD) for z in exponent], 1.0)
     see_rate = np.array([1.0, 0.0] * 3 + [0.0])
     # The integral of Re(s exp(λ t)) is Re(s exp(λ t) / λ).
     see_depth = np.append(np.stack([(1 / exponent).real, -(1 / exponent).imag], axis=1).ravel(), 1.0)
     stirs, rows, readings, noises = [], [], [], []
     for k in range(1, steps + 1):
-        waves.advance(np.array([rates[k - 1], 0.0]))
-        waves.correct(np.array([depths[k - 1], 0.0]) - waves.heave())
-        grow = 2.0 * PERIOD / bank.build_up if k * PERIOD < bank.build_up else 1.0 - np.exp(-2 * bank.damping * PERIOD)
-        stirs.append(np.diag([2.0 * bank.variance / 3 * grow, 0.0] * 3 + [bank.offset_drift * PERIOD]))
+        foretold = filtered.rate(np.array([PERIOD]))[0, 0]
+        filtered.advance(np.array([rates[k - 1], 0.0]))
+        assert filtered.innovation[0] == pytest.approx(rates[k - 1] - foretold, abs=1e-12)
+        filtered.correct(np.array([depths[k - 1], 0.0]) - filtered.heave())
+        grow = 2.0 * PERIOD / build_up if k * PERIOD < build_up else 1.0 - np.exp(-2.0 * bank.damping * PERIOD)
+        stirred = np.stack([2.0 * variance * grow, np.zeros(3)], axis=1).ravel()
+        stirs.append(np.diag(np.append(stirred, bank.offset_drift * PERIOD)))
         there = k % hold == 0
         rows.append(np.array([see_rate, see_depth] if there else [see_rate]))
         readings.append(np.array([rates[k - 1], depths[k - 1]] if there else [rates[k - 1]]))
         noises.append(np.array([bank.rate_noise, bank.depth_noise] if there else [bank.rate_noise]))
-    start = np.diag([0.0] * 6 + [1e-6])
+    # A ship that moves already has the whole variance in both parts of every oscillator.
+    start = np.diag(np.append(np.zeros(6) if build_up else np.repeat(variance, 2), 1e-6))
     want = conditioned(a, start, stirs, rows, readings, noises)
-    assert waves.heave()[0] == pytest.approx(see_depth @ want, rel=1e-6)
-    assert waves.rate(np.array([0.0]))[0, 0] == pytest.approx(see_rate @ want, rel=1e-6)
+    assert filtered.heave()[0] == pytest.approx(see_depth @ want, rel=1e-6)
+    assert filtered.rate(np.array([0.0]))[0, 0] == pytest.approx(see_rate @ want, rel=1e-6)
     ahead = np.linspace(0.0, 1.5, 1501)
-    rate = waves.rate(ahead)[:, 0]
-    assert waves.path(ahead[-1:])[0, 0] == pytest.approx(np.trapezoid(rate, ahead), abs=1e-6)
-    phasors = waves.phasors()[0] * np.exp(np.outer([0.0, 1.5], waves.exponents))
-    assert np.diff(phasors.real.sum(axis=1))[0] == pytest.approx(waves.path(ahead[-1:])[0, 0], abs=1e-12)
-    assert waves.heave()[1] == 0.0  # the other row's readings were all zero
+    rate = filtered.rate(ahead)[:, 0]
+    assert filtered.path(ahead[-1:])[0, 0] == pytest.approx(np.trapezoid(rate, ahead), abs=1e-6)
+    phasors = filtered.phasors()[0] * np.exp(np.outer([0.0, 1.5], filtered.exponents))
+    assert np.diff(phasors.real.sum(axis=1))[0] == pytest.approx(filtered.path(ahead[-1:])[0, 0], abs=1e-12)
+    assert filtered.foretold(np.array([0.7]), np.array([1.5]), delay=0.2)[:, 0] == pytest.approx(
+        [
+            filtered.rate(np.array([0.9]))[0, 0],
+            (filtered.path(np.array([1.7])) - filtered.path(np.array([0.2])))[0, 0],
+        ]
+    )
+    assert filtered.heave()[1] == 0.0  # the other row's readings were all zero
 
 
 def rotation(angle):
@@ -72,12 +90,14 @@ def test_the_rope_filter_is_the_conditional_mean():
     rope.start(model, PERIOD, noise)
     for reading in stretch:
         rope.advance(np.zeros(2), reading)
-    see = np.array([[-1.0, 0.0, 1.0]])
+    # The fourth is the bias of the reading: the first one's error, which does not change.
+    see = np.array([[-1.0, 0.0, 1.0, 1.0]])
     for i in range(2):
-        a, b = model.a[i, :3, :3], model.b[i, :3]
-        process_noise = rate_noise**2 * np.outer(b, b) + np.diag([0.0, (ACCELERATION_NOISE * PERIOD) ** 2, 0.0])
+        a, b = block_diag(model.a[i, :3, :3], 1.0), np.append(model.b[i, :3], 0.0)
+        process_noise = rate_noise**2 * np.outer(b, b) + np.diag([0.0, (ACCELERATION_NOISE * PERIOD) ** 2, 0.0, 0.0])
+        start = np.diag([1e-4, 1e-4, 1e-4, noise[i] ** 2])
         arguments = ([process_noise] * steps, [see] * steps, stretch[:, i : i + 1], [noise[i : i + 1]] * steps)
-        want = conditioned(a, 1e-4 * np.eye(3), *arguments)
+        want = conditioned(a, start, *arguments)
         assert rope.load_velocity[i] == pytest.approx(want[1], rel=1e-6)
         assert rope.stretch[i] == pytest.approx(want[2] - want[0], rel=1e-6)
 
@@ -108,7 +128,8 @@ def two_sines(times):
 
 def test_two_sines_are_foretold():
     """Once the filter has followed them, 0.1 s to 2 s ahead; a held value would be off by 2 sin(ω τ / 2)."""
-    waves = WaveFilter(2, PERIOD, 10)
+    sea = ExpectedWaves(frequency=tuple(np.linspace(0.35, 1.6, 48)), variance=(0.26 / 48,) * 48, build_up=10.0)
+    waves = WaveFilter(2, PERIOD, 10, WaveBank.of(sea, Sensors()))
     ahead = np.array([0.1, 0.5, 2.0])
     missed_rate, missed_path, held = [], [], []
     for k in range(1500):
@@ -126,3 +147,18 @@ def test_two_sines_are_foretold():
     assert (rms < 0.35 * held_rms).all()
     assert (np.sqrt(np.mean(np.square(missed_path), axis=0)) < 0.35 * ahead * held_rms).all()
     assert not waves.rate(ahead)[:, 1].any()  # the other row's sea is none of this one's
+
+
+def test_a_bias_of_the_stretch_is_told_from_the_bobbing():
+    """The first reading said too much weight: the load's stretch is off by the same all along, and does not swing."""
+    model, bias, noise = RopeModel.of(np.array([2.0]), 0.03, PERIOD), 0.02, np.array([0.02])
+    rope = RopeFilter(1, 0.01)
+    rope.start(model, PERIOD, noise)
+    z, left = np.zeros((1, 4)), []
+    for k in range(600):
+        speed = np.array([0.3 * np.cos(0.7 * k * PERIOD)])
+        z[:, 3] = 0.0
+        z = model.advance(z, speed)
+        rope.advance(speed, z[:, 2] - z[:, 0] + bias)
+        left.append(rope.stretch[0] - (z[0, 2] - z[0, 0]))
+    assert np.abs(left[300:]).max() < 0.25 * bias

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from aframe_env import Crane, InvalidValue, RecordedMotion, Scenario, ScenarioDistribution, TaskConfig, Winch
-from agents.control.feedback import StateFeedback
+from agents.control.feedback import Feedback
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.optimum import CommandSequence, optimise, required_commands, saturating
 from agents.policy import DrumStill
@@ -50,7 +50,7 @@ def test_it_is_the_floor(scenarios, still):
     assert np.all(abs(np.diff(played.drum_speed, axis=1)) <= 0.1 * acceleration * (1.0 + 1e-4))
 
     # No policy is better, not even those that know the future.
-    for policy in (InverseDynamics(), StateFeedback()):
+    for policy in (InverseDynamics(), Feedback(None)):
         assert np.all(run(policy, scenarios, CONFIG).omega1 >= best.omega1 * (1.0 - 1e-9))
 
     # Other starts end in the same place.
