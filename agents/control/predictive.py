@@ -23,23 +23,29 @@ from agents.control.regulator import HoistBatch, Observation
 from agents.control.rope import RopeModel
 from agents.policy import FloatArray, Knowledge
 
+STATE_EFFORT = 0.026
+"""Tuned with ``python -m train.tune_control``, s²."""
+SENSOR_EFFORT = 0.05
+"""Tuned with ``python -m train.tune_control``, s²."""
+
 
 @dataclass
 class PredictiveControl:
     """Model-predictive control; the agents' Kalman filters predict the motion."""
 
-    effort: float = 0.026
-    """Weight on changes of the rope end's speed, s²; that of the feedback law beside it."""
+    sensors: Sensors | None = field(default_factory=Sensors)
+    """Delay and noise that the law is designed for; None for the full state, which has neither."""
+    effort: float | None = None
+    """Weight on changes of the rope end's speed, s²; None for the one that was tuned."""
     horizon: int = 50
     """Control steps."""
     damping_ratio: float = 0.03
     """Damping of the load's bobbing on the rope that the law is designed for, share of critical."""
-    sensors: Sensors | None = field(default_factory=Sensors)
-    """Delay and noise that the law is designed for; None for the full state, which has neither."""
     waves: ExpectedWaves = field(default_factory=lambda: ExpectedWaves.of(ScenarioDistribution()))
     """Motion that it is designed for."""
     name: str = field(init=False)
     knows: Knowledge = field(init=False)
+    _price: float = field(init=False, repr=False)
     _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
     _period: float = field(init=False, repr=False, default=0.1)
     _hoists: HoistBatch | None = field(init=False, repr=False, default=None)
@@ -52,7 +58,8 @@ class PredictiveControl:
     def __post_init__(self) -> None:
         self.knows = Knowledge.STATE if self.sensors is None else Knowledge.SENSORS
         self.name = "predictive control (state)" if self.sensors is None else "predictive control"
-        require_number("effort", self.effort, "s²", low=1e-8, high=1e8)
+        self._price = self.effort or (STATE_EFFORT if self.sensors is None else SENSOR_EFFORT)
+        require_number("effort", self._price, "s²", low=1e-8, high=1e8)
         require_integer("horizon", self.horizon, low=2, high=1000)
         require_number("damping_ratio", self.damping_ratio, "of critical", low=0.0, high=1.0)
 
@@ -69,8 +76,8 @@ class PredictiveControl:
             self._observer = observer_for(hoists, self.damping_ratio, self.sensors, self.waves)
             self._observer.start(o)
             self._model = self._observer.model
-            self._k = self._model.gains(self.effort)
-            self._cost_to_go = self._model.costs_to_go(self.effort)
+            self._k = self._model.gains(self._price)
+            self._cost_to_go = self._model.costs_to_go(self._price)
         else:
             hoists = self._hoists
             self._observer.advance(self._turned, hoists.columns(observation))
@@ -117,7 +124,7 @@ class PredictiveControl:
             middle_input=np.zeros((count, horizon)),
             error=np.ascontiguousarray(free[:, :, 0].T),
             error_middle=np.zeros((count, horizon)),
-            weights=(1.0, 0.0, self.effort),
+            weights=(1.0, 0.0, self._price),
             inputs=inputs,
             state=z[:, 3:] - pulley,
             input_limit=gain,

@@ -245,7 +245,9 @@ def test_a_load_pin_that_is_off_by_a_tenth_is_borne(make, factor):
             return self._policy.act(told, time)
 
     still = run(DrumStill(), scenarios)
-    off, right = (run(policy, scenarios, observation="sensors") for policy in (Pinned(make(), "sensors", factor), make()))
+    off, right = (
+        run(policy, scenarios, observation="sensors") for policy in (Pinned(make(), "sensors", factor), make())
+    )
     assert np.median(off.rms / right.rms) < 1.1
     # There is no feedback beneath an agent: it is the share that an output of zero leaves anyhow.
     assert np.median(1.0 - off.rms / still.rms) > (0.9 if "zero" in make().name else 0.95)
@@ -272,7 +274,9 @@ def test_a_ship_that_moves_already_costs_the_sensors_little(make):
     assert np.median(sensed.rms / seen.rms) < 1.5
     assert np.median(sensed.rms / misled.rms) < 0.95
     still = run(DrumStill(), scenarios)
-    late, still_late = (np.sqrt(np.mean(np.square(each.error[:, 300:], dtype=np.float64), axis=1)) for each in (sensed, still))
+    late, still_late = (
+        np.sqrt(np.mean(np.square(each.error[:, 300:], dtype=np.float64), axis=1)) for each in (sensed, still)
+    )
     assert np.median(late / still_late) < 0.03
 
 

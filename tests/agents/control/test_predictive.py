@@ -31,7 +31,9 @@ def law(rows, crane):
 
         def act(self, observation, time):
             if not frequency:
-                tension, length = (observation[:, index(name)].astype(float) for name in ("rope_tension", "rope_length"))
+                tension, length = (
+                    observation[:, index(name)].astype(float) for name in ("rope_tension", "rope_length")
+                )
                 frequency.extend(np.sqrt(crane.rope.axial_stiffness / (length * tension / GRAVITY)))
                 return policy.act(observation, time)
             return np.zeros(rows)
