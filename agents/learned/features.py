@@ -65,6 +65,8 @@ PRESENT: Final = (
     "bobbing_rate",
     "max_rope_speed",
     "max_rope_acceleration",
+    "speed_peak_to_come",
+    "acceleration_peak_to_come",
 )
 FORETOLD: Final = (
     *(f"pulley_velocity_z_in_{t:g}_s" for t in AHEAD),
@@ -185,6 +187,7 @@ class Features:
                 *of_the_winch,
                 *of_the_pulley,
                 *hoist.constant(),
+                *hoist.peaks(np, velocity[rows], foretold[: len(AHEAD)]),
                 *foretold,
                 10.0 * observer.waves.innovation[rows],
             ],
@@ -236,8 +239,21 @@ class HoistFeatures:
         change = (pulley_speed - rope_speed) / (self.max_rope_acceleration * self.period)
         return rope_speed / self.max_rope_speed, 4.0 * xp.tanh(0.5 * change)
 
+    def peaks(self, xp: Any, velocity: Any, foretold: Any) -> tuple[Any, ...]:
+        """The last ones: greatest speed and acceleration to come, as shares of what the winch has.
+
+        Velocity (N,) of the pulley now and what is foretold of it at ``AHEAD``, (A, N) m/s.
+        """
+        speed, acceleration = abs(velocity), 0.0 * velocity
+        before, then = velocity, 0.0
+        for time, after in zip(AHEAD, foretold, strict=True):
+            speed = xp.maximum(speed, abs(after))
+            acceleration = xp.maximum(acceleration, abs(after - before) / (time - then))
+            before, then = after, time
+        return 2.0 * speed / self.max_rope_speed - 1.0, 2.0 * acceleration / self.max_rope_acceleration - 1.0
+
     def constant(self) -> tuple[Any, ...]:
-        """The last ones, which are the same all along an episode, but for the rope's length."""
+        """The next ones, which are the same all along an episode, but for the rope's length."""
         return (
             self.mass / 5.0e4 - 1.2,
             self.rope_length / 1.0e3 - 0.8,

@@ -28,8 +28,10 @@ class Options(RunOptions, HeldOut):
     """Policies, and the held-out scenarios that they meet."""
 
     policies: tuple[str, ...] = (
+        "results/agents/apg",
         "results/agents/ppo",
         "results/agents/sac",
+        "results/agents/apg-sensors",
         "results/agents/ppo-sensors",
         "results/agents/sac-sensors",
         "results/drive-map",
@@ -37,6 +39,7 @@ class Options(RunOptions, HeldOut):
         *AFTER_TRAINING,
         "output zero",
         "output zero on sensors",
+        "predictive control (state)",
         "predictive control",
         "inverse dynamics",
     )

@@ -47,7 +47,7 @@ class Options(LearningOptions):
     """Control steps of the twin to learn from, over all rows."""
     n_envs: int = 512
     """Rows of the twin in an update."""
-    learning_rate: float = 1e-3
+    learning_rate: float = 2e-3
     """At the start; it falls linearly to a thirtieth."""
     episodes: int = 1200
     """Recorded episodes."""
@@ -57,7 +57,7 @@ class Options(LearningOptions):
     """Length of a stretch, s."""
     tail: float = 0.3
     """Weight of the squared share of the heave that is left, beside the share: of the worst rows."""
-    detail: float = 0.01
+    detail: float = 0.0
     """Weight of its logarithm: of the best rows."""
 
     def __post_init__(self) -> None:
