@@ -131,7 +131,6 @@ class WaveFilter:
         self._state = np.zeros((rows, len(self._exponent) + 1), dtype=np.complex128)
         """The heave rate is the sum of the real parts of all but the last, m/s; the last is the offset, m."""
         self._step = np.zeros(rows, dtype=np.int64)
-        self._factors: dict[tuple[bytes, bytes, float], ComplexArray] = {}
         self.innovation = np.zeros(rows)
         """Latest reading of the heave rate less what was foretold of it, (N,) m/s."""
 
@@ -172,29 +171,13 @@ class WaveFilter:
         """Velocity (T, N) m/s of the pulley, ``times`` (T,) s after the latest reading's moment of measurement."""
         return self._sum(np.exp(np.outer(times, self._exponent)))
 
+    def acceleration(self, times: FloatArray) -> FloatArray:
+        """Acceleration (T, N) m/s² of the pulley at these times."""
+        return self._sum(np.exp(np.outer(times, self._exponent)) * self._exponent)
+
     def path(self, times: FloatArray) -> FloatArray:
         """Rise (T, N) m of the pulley since that moment."""
         return self._sum(np.expm1(np.outer(times, self._exponent)) / self._exponent)
-
-    def foretold(self, ahead: FloatArray, rises: FloatArray, rows: Rows = ALL, delay: float = 0.0) -> FloatArray:
-        """Velocities (A, n) m/s of the pulley ``ahead`` (A,) s from now, and its rises (R, n) m by ``rises`` (R,) s.
-
-        Now is ``delay`` s after the latest reading's moment of measurement; the two are one array (A + R, n).
-        """
-        factors = self._foretelling(ahead.tobytes(), rises.tobytes(), delay)
-        # As real numbers in one product. A row's sum does not depend on the others: each is a sum of its own.
-        state = self._state[rows, :-1]
-        turned = np.einsum("fb,nb->fn", factors.imag, state.imag)
-        return np.asarray(np.einsum("fb,nb->fn", factors.real, state.real) - turned)
-
-    def _foretelling(self, ahead: bytes, rises: bytes, delay: float) -> ComplexArray:
-        key = (ahead, rises, delay)
-        if key not in self._factors:
-            now = np.exp(self._exponent * delay)
-            rate = np.exp(np.outer(np.frombuffer(ahead), self._exponent))
-            rise = np.expm1(np.outer(np.frombuffer(rises), self._exponent)) / self._exponent
-            self._factors[key] = np.concatenate([rate, rise]) * now
-        return self._factors[key]
 
     def _sum(self, factors: ComplexArray) -> FloatArray:
         # Row by row in the same order, whatever the batch: a sum, not a matrix product.

@@ -68,10 +68,16 @@ class KalmanObserver:
         """Rise of the pulley during each of the coming control steps, (steps, N) m."""
         return np.diff(self.waves.path(self._times(steps + 1)), axis=0)
 
-    def pulley(self) -> tuple[FloatArray, FloatArray]:
-        """Velocity [m/s] and mean acceleration [m/s²] over the coming control step, (N,) of the pulley."""
-        now, later = self.waves.rate(self._times(2))
-        return now, (later - now) / self._hoists.period
+    def pulley(self) -> tuple[FloatArray, ...]:
+        """Velocity [m/s] of the pulley, its acceleration in the middle of the coming control step, and the mean ones.
+
+        These are over that step and the next, all (N,), m/s².
+        """
+        period = self._hoists.period
+        velocity = self.waves.rate(self._times(3))
+        middle = self.waves.acceleration(self._times(1) + 0.5 * period)[0]
+        soon, later = np.diff(velocity, axis=0) / period
+        return velocity[0], middle, soon, later
 
     def _times(self, count: int) -> FloatArray:
         """Now and the ends of the coming control steps, s after the moment of measurement."""
@@ -134,7 +140,7 @@ class StateObserver:
         rises[0] = period * (self._velocity + 0.5 * period * self._acceleration)
         return rises
 
-    def pulley(self) -> tuple[FloatArray, FloatArray]:
+    def pulley(self) -> tuple[FloatArray, ...]:
         """Velocity [m/s] and acceleration [m/s²] (N,) of the pulley."""
         return self._velocity, self._acceleration
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -59,28 +58,12 @@ class Regulator:
 
     def speed(self, z: FloatArray) -> FloatArray:
         """Speed (N,) m/s that the rope's end should have during the control step, from the state z (N, 4)."""
-        return np.asarray(regulated_speed(np, self.k.T, self.amplitude, self.acceleration, z.T))
-
-
-def regulated_speed(xp: Any, k: Any, amplitude: Any, acceleration: Any, z: Any) -> Any:
-    """``Regulator.speed`` with gains k (4, N) and state z (4, N), arrays of ``xp`` = numpy or torch."""
-    e, v, q, p = z
-    ke, kv, kq, kp = k
-    goal = xp.clip((ke * (q - e) + kv * (p - v)) / (ke + kq), -amplitude, amplitude)
-    wanted = (ke + kq) / (kv + kp) * (goal - q)
-    # Not quite zero: the slope of a square root is endless there, and learning goes along it.
-    braking = xp.sqrt(2.0 * acceleration * xp.clip(abs(goal - q), 1e-9, None))
-    return p + (kv + kp) * (xp.clip(wanted, -braking, braking) - p)
-
-
-GRID: Final = np.geomspace(0.05, 60.0, 512)
-"""Frequencies of the loads' bobbing that gains are tabled for, rad/s."""
-
-
-@cache
-def gain_table(damping_ratio: float, effort: float, period: float) -> FloatArray:
-    """Gains (4, GRID) of the linear-quadratic regulator at the frequencies of ``GRID``."""
-    return RopeModel.of(GRID, damping_ratio, period).gains(effort).T.copy()
+        e, v, q, p = z.T
+        ke, kv, kq, kp = self.k.T
+        goal = np.clip((ke * (q - e) + kv * (p - v)) / (ke + kq), -self.amplitude, self.amplitude)
+        wanted = (ke + kq) / (kv + kp) * (goal - q)
+        braking = np.sqrt(2.0 * self.acceleration * abs(goal - q))
+        return np.asarray(p + (kv + kp) * (np.clip(wanted, -braking, braking) - p))
 
 
 class HoistBatch:

@@ -19,7 +19,7 @@ from aframe_env.serialization import strict_converter, structure
 from aframe_env.validation import InvalidValue
 from agents.control.expected_waves import ExpectedWaves
 from agents.learned.feature_policy import OnFeatures
-from agents.learned.features import FEATURES, Action, FeatureConfig
+from agents.learned.features import Action, FeatureConfig, feature_names
 from agents.learned.network import Actor
 from agents.policy import FloatArray, Knowledge
 
@@ -78,8 +78,9 @@ class LearnedPolicy(OnFeatures):
             f"{self.card.algorithm} on sensors" if sensed else self.card.algorithm,
             self.card.made_for,
         )
-        if self.card.features != FEATURES:
-            raise InvalidValue(f"the agent's features are {self.card.features}, this version makes {FEATURES}")
+        expected = feature_names(self.card.sensors)
+        if self.card.features != expected:
+            raise InvalidValue(f"the agent's features are {self.card.features}, this version makes {expected}")
 
     def _output(self, inputs: npt.NDArray[np.float32]) -> FloatArray:
         # In blocks of one size: how a matrix product is summed depends on its shape, and a row must not on the others.
@@ -148,7 +149,8 @@ def output_zero(config: FeatureConfig) -> LearnedPolicy:
     What a trained agent removes beyond this is learned.
     """
     sensors = config.sensors
-    actor = Actor(len(FEATURES), 1)
+    features = feature_names(sensors)
+    actor = Actor(len(features), 1)
     for parameter in actor.parameters():
         torch.nn.init.zeros_(parameter)
     card = AgentCard(
@@ -157,7 +159,7 @@ def output_zero(config: FeatureConfig) -> LearnedPolicy:
         sensors=sensors,
         waves=config.waves,
         action=config.action,
-        features=FEATURES,
+        features=features,
         hidden=1,
         control_period=config.control_period,
         seed=0,

@@ -20,7 +20,7 @@ from aframe_env.scenario.crane import Crane
 from aframe_env.validation import InvalidValue, require_choice, require_number
 from agents.control.filters import ALL, FloatArray, Rows
 from agents.control.regulator import Observation
-from agents.learned.features import ACTIONS, FEATURES, Action, FeatureConfig, Features
+from agents.learned.features import ACTIONS, STATE_FEATURES, Action, FeatureConfig, Features
 
 Float32Array = npt.NDArray[np.float32]
 
@@ -92,12 +92,12 @@ class LearnerFeatures:
         """``privileged``: as in ``InterfaceConfig``."""
         self._features = Features(rows, config)
         self._privileged = Features(rows, replace(config, sensors=None)) if privileged and config.sensors else None
-        self.actor_inputs = len(FEATURES)
+        self.actor_inputs = len(self._features.names)
         """Number of features that are the agent's, the first ones."""
-        self.names: tuple[str, ...] = FEATURES
+        self.names: tuple[str, ...] = self._features.names
         """Names of all features; those for critics begin with "true_"."""
         if self._privileged:
-            self.names += tuple(f"true_{name}" for name in FEATURES)
+            self.names += tuple(f"true_{name}" for name in STATE_FEATURES)
         self.values = np.zeros((rows, len(self.names)), dtype=np.float32)
         """The present features (N, F), in place."""
 

@@ -28,10 +28,8 @@ class Options(RunOptions, HeldOut):
     """Policies, and the held-out scenarios that they meet."""
 
     policies: tuple[str, ...] = (
-        "results/agents/apg",
         "results/agents/ppo",
         "results/agents/sac",
-        "results/agents/apg-sensors",
         "results/agents/ppo-sensors",
         "results/agents/sac-sensors",
         "results/drive-map",

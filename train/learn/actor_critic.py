@@ -71,12 +71,6 @@ def _constant(inputs: int, value: float) -> nn.Linear:
     return layer
 
 
-def begin_with(actor: Actor, latent: ActorLatent, head: nn.Module) -> None:
-    """Copy an agent's network into a learner's actor."""
-    latent.perceptron.load_state_dict(actor.perceptron.state_dict())
-    head.load_state_dict(actor.head.state_dict())
-
-
 def actor_of(latent: ActorLatent, head: Mapping[str, torch.Tensor], *, squashed: bool) -> Actor:
     """The agent's network, from a learner's actor."""
     actor = Actor(latent.inputs, latent.perceptron[0].out_features, squashed=squashed)  # type: ignore[arg-type]
@@ -132,19 +126,6 @@ class TwoPathPolicy(ActorCriticPolicy):
             self.features_dim, self._actor_inputs, self._hidden
         )
 
-    def begin_with(self, actor: Actor) -> None:
-        """Take over an agent's network."""
-        latent = self.mlp_extractor.actor
-        assert isinstance(latent, ActorLatent)
-        begin_with(actor, latent, self.action_net)
-
-    def freeze_actor(self, frozen: bool) -> None:
-        """Keep the actor as it is, or let it learn."""
-        latent = self.mlp_extractor.actor
-        assert isinstance(latent, ActorLatent)
-        for parameter in (*latent.parameters(), *self.action_net.parameters(), self.log_std):
-            parameter.requires_grad_(not frozen)
-
     def to_actor(self) -> Actor:
         """Return the mean action as a plain network of its own."""
         latent = self.mlp_extractor.actor
@@ -190,12 +171,6 @@ class TwoPathSACPolicy(SACPolicy):
             critic.q_networks[i] = network
             setattr(critic, f"qf{i}", network)
         return critic
-
-    def begin_with(self, actor: Actor) -> None:
-        """Take over an agent's network."""
-        latent = self.actor.latent_pi
-        assert isinstance(latent, ActorLatent)
-        begin_with(actor, latent, self.actor.mu)
 
     def to_actor(self) -> Actor:
         """Return the mean action as a plain network of its own."""

@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import Literal
 
 from aframe_env.config import TaskConfig
-from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
-from agents.learned.agent import load
+from aframe_env.validation import require_choice, require_integer, require_number
 from agents.learned.features import ACTIONS, Action, FeatureConfig
 from agents.learned.interface import InterfaceConfig
-from agents.learned.network import Actor
 from train.evaluate.run import HeldOut
 from train.shared.run_folder import RunOptions
 
@@ -40,10 +38,23 @@ class LearningOptions(RunOptions):
     """Control step, s."""
     episode_duration: float = TaskConfig.episode_duration
     """s."""
+    batch_size: int = 1024
+    """Minibatch."""
     learning_rate: float = 1e-3
     """At the start; it falls linearly to a thirtieth."""
+    gamma: float = 0.95
+    """Discount for a control step: a horizon of two seconds."""
     hidden: int = 64
     """Units of each hidden layer."""
+    horizon: float = InterfaceConfig.horizon
+    """Rows start a new scenario after this time, s."""
+    drift_limit: float = InterfaceConfig.drift_limit
+    """Depth error at which a row starts anew, m; its last state's value stands for the rest."""
+    reward_scale: float = InterfaceConfig.reward_scale
+    """Reward for a metre of root mean square depth error over a step."""
+    reward_knee: float = InterfaceConfig.reward_knee
+    """Depth error beyond which the reward falls with its logarithm only, m: what is learned would otherwise be spent on
+    the few loads that drift far off, not on the last centimetres of all others."""
     eval_scenarios: int = 200
     """Held-out scenarios of the comparison at the end; 0 leaves it out."""
     eval_privileged: int = 20
@@ -61,8 +72,12 @@ class LearningOptions(RunOptions):
         require_choice("action", self.action, ACTIONS)
         require_number("control_period", self.control_period, "s", low=0.01, high=2.0)
         self.config  # noqa: B018 - raises here, before anything is written
+        require_integer("batch_size", self.batch_size, low=2, high=10**9)
         require_number("learning_rate", self.learning_rate, "", low=0.0, high=1.0, low_open=True)
+        require_number("gamma", self.gamma, "", low=0.0, high=1.0)
         require_integer("hidden", self.hidden, low=1, high=4096)
+        require_number("horizon", self.horizon, "s", low=self.control_period, high=self.episode_duration)
+        self.interface  # noqa: B018 - likewise
         require_integer("eval_scenarios", self.eval_scenarios, low=0, high=10**6)
         require_integer("eval_privileged", self.eval_privileged, low=0, high=10**6)
         require_integer("threads", self.threads, low=1, high=256)
@@ -82,6 +97,18 @@ class LearningOptions(RunOptions):
         """What the agent's features are made for."""
         return FeatureConfig.of(self.config, self.action)
 
+    @cached_property
+    def interface(self) -> InterfaceConfig:
+        """What the rows have on top of the task."""
+        return InterfaceConfig(
+            action=self.action,
+            reward_scale=self.reward_scale,
+            reward_knee=self.reward_knee,
+            drift_limit=self.drift_limit,
+            horizon=self.horizon,
+            privileged=True,
+        )
+
     @property
     def held_out(self) -> HeldOut:
         """Held-out scenarios of the same task, for the comparison at the end."""
@@ -97,62 +124,3 @@ class LearningOptions(RunOptions):
     def rate(self, remaining: float) -> float:
         """Learning rate when a share ``remaining`` of the training is left."""
         return self.learning_rate * max(remaining, 1.0 / 30.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class RewardOptions(LearningOptions):
-    """Options of the learners that go by rewards."""
-
-    batch_size: int = 1024
-    """Minibatch."""
-    gamma: float = 0.95
-    """Discount for a control step: a horizon of two seconds."""
-    horizon: float = InterfaceConfig.horizon
-    """Rows start a new scenario after this time, s."""
-    drift_limit: float = InterfaceConfig.drift_limit
-    """Depth error at which a row starts anew, m; its last state's value stands for the rest."""
-    reward_scale: float = InterfaceConfig.reward_scale
-    """Reward for a metre of root mean square depth error over a step."""
-    reward_knee: float = InterfaceConfig.reward_knee
-    """Depth error beyond which the reward falls with its logarithm only, m: what is learned would otherwise be spent on
-    the few loads that drift far off, not on the last centimetres of all others."""
-    start: Path | None = None
-    """Folder of an agent whose network to begin with, in place of one that says nothing."""
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_integer("batch_size", self.batch_size, low=2, high=10**9)
-        require_number("gamma", self.gamma, "", low=0.0, high=1.0)
-        require_number("horizon", self.horizon, "s", low=self.control_period, high=self.episode_duration)
-        self.interface  # noqa: B018 - raises here, before anything is written
-        self.first_actor  # noqa: B018 - likewise
-
-    @cached_property
-    def interface(self) -> InterfaceConfig:
-        """What the rows have on top of the task."""
-        return InterfaceConfig(
-            action=self.action,
-            reward_scale=self.reward_scale,
-            reward_knee=self.reward_knee,
-            drift_limit=self.drift_limit,
-            horizon=self.horizon,
-            privileged=True,
-        )
-
-    @cached_property
-    def first_actor(self) -> Actor | None:
-        """Network to begin with, if any; that of the same seed where the folder has several."""
-        if self.start is None:
-            return None
-        mine = self.start / f"seed-{self.seed}"
-        policy = load(mine if mine.is_dir() else self.start)
-        for name, wanted in (
-            ("observation", self.observation),
-            ("action", self.action),
-            ("hidden", self.hidden),
-            ("control_period", self.control_period),
-        ):
-            found = getattr(policy.card, name)
-            if found != wanted:
-                raise InvalidValue(f"start = {str(self.start)!r}: an agent with {name} = {found!r}: must be {wanted!r}")
-        return policy.actor

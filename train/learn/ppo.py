@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from stable_baselines3 import PPO
 
 from aframe_env.validation import require_choice, require_integer, require_number
 from train.learn.actor_critic import TwoPathPolicy
 from train.learn.learner import Learner, LearnerSpec, Range, Search
-from train.learn.options import RewardOptions
+from train.learn.options import LearningOptions
 from train.learn.sb3_env import make_rows
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(RewardOptions):
+class Options(LearningOptions):
     """Options of the training; the defaults are a trial of results/tune-ppo, rounded."""
 
     device: Literal["cpu", "cuda"] = "cpu"
@@ -36,8 +36,6 @@ class Options(RewardOptions):
     """PPO's clipping."""
     log_std_init: float = -1.65
     """Logarithm of the first standard deviation of an action."""
-    critic_first: int = 0
-    """Updates at the start that the critic learns from alone."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -48,31 +46,13 @@ class Options(RewardOptions):
         require_integer("n_epochs", self.n_epochs, low=1, high=1000)
         require_number("gae_lambda", self.gae_lambda, "", low=0.0, high=1.0)
         require_number("clip_range", self.clip_range, "", low=0.0, high=1.0, low_open=True)
-        require_integer("critic_first", self.critic_first, low=0, high=10**6)
         require_number("log_std_init", self.log_std_init, "", low=-20.0, high=2.0)
-
-
-class CriticFirstPPO(PPO):
-    """PPO whose critic learns alone at first: it has everything to learn where the actor has not."""
-
-    def __init__(self, critic_first: int, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        self._critic_first = critic_first
-
-    def train(self) -> None:
-        """Update the networks from what was collected; in the first updates the critic only."""
-        rollout = self.num_timesteps // (self.n_steps * self.n_envs)
-        policy = self.policy
-        assert isinstance(policy, TwoPathPolicy)
-        policy.freeze_actor(rollout <= self._critic_first)
-        super().train()
 
 
 def build(options: Options) -> Learner:
     """The learner and its rows."""
     rows = make_rows(options)
-    model = CriticFirstPPO(
-        options.critic_first,
+    model = PPO(
         TwoPathPolicy,
         rows,
         n_steps=options.n_steps,
@@ -92,8 +72,6 @@ def build(options: Options) -> Learner:
     )
     policy = model.policy
     assert isinstance(policy, TwoPathPolicy)
-    if options.first_actor is not None:
-        policy.begin_with(options.first_actor)
     return Learner("PPO", model, rows, policy.to_actor)
 
 

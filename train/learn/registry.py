@@ -13,7 +13,6 @@ from gymnasium.error import DependencyNotInstalled
 from train.learn.learner import LearnerSpec
 
 LEARNERS: Final = {
-    "apg": "train.learn.apg",
     "ppo": "train.learn.ppo",
     "ppo-rsl": "train.learn.ppo_rsl",
     "sac": "train.learn.sac",

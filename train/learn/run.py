@@ -13,7 +13,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, serialise
-from agents.learned.features import FEATURES
+from agents.learned.features import feature_names
 from train.evaluate.run import evaluate
 from train.learn.learner import Learner, LearnerSpec, Rows
 from train.learn.options import LearningOptions
@@ -59,7 +59,7 @@ def to_policy(learner: Learner, options: LearningOptions) -> tuple[LearnedPolicy
         sensors=options.features.sensors,
         waves=options.features.waves,
         action=options.action,
-        features=FEATURES,
+        features=feature_names(options.features.sensors),
         hidden=options.hidden,
         squashed=actor.squashed,
         control_period=options.control_period,

@@ -10,12 +10,12 @@ from stable_baselines3 import SAC
 from aframe_env.validation import require_integer, require_number
 from train.learn.actor_critic import TwoPathSACPolicy
 from train.learn.learner import Learner, LearnerSpec, Range, Search
-from train.learn.options import RewardOptions
+from train.learn.options import LearningOptions
 from train.learn.sb3_env import make_rows
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(RewardOptions):
+class Options(LearningOptions):
     """Options of the training."""
 
     timesteps: int = 300_000
@@ -84,8 +84,6 @@ def build(options: Options) -> Learner:
     )
     policy = model.policy
     assert isinstance(policy, TwoPathSACPolicy)
-    if options.first_actor is not None:
-        policy.begin_with(options.first_actor)
     return Learner("SAC", model, rows, policy.to_actor)
 
 

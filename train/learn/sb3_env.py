@@ -20,7 +20,7 @@ from aframe_env.config import TaskConfig
 from aframe_env.simulation import Simulation
 from agents.learned.features import LIMIT, FeatureConfig
 from agents.learned.interface import Cuts, InterfaceConfig, LearnerFeatures
-from train.learn.options import RewardOptions
+from train.learn.options import LearningOptions
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
@@ -151,7 +151,7 @@ class TrainingVecEnv(VecEnv):
         return [seed] * self.num_envs
 
 
-def make_rows(options: RewardOptions) -> TrainingVecEnv:
+def make_rows(options: LearningOptions) -> TrainingVecEnv:
     """Rows of the environment for a learner."""
     torch.set_num_threads(options.threads)
     return TrainingVecEnv(options.n_envs, options.config, options.interface, seed=options.seed)
