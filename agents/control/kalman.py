@@ -79,7 +79,7 @@ class Schedule:
 def schedule(bank: WaveBank, period: float, hold: int) -> Schedule:
     """Gains of the Kalman filter by the recursion of its covariance over 60 s."""
     steps = hold * round(60.0 / period / hold) + hold
-    exponent = _exponents(bank)
+    exponent = exponents(bank)
     bands, build_up = len(exponent), bank.waves.build_up
     transition = np.append(np.exp(exponent * period), 1.0)[:, None]
     rate = np.append(np.tile([1.0, 0.0], bands), 0.0)
@@ -116,8 +116,16 @@ def _propagated(transition: ComplexArray, columns: FloatArray) -> FloatArray:
     return np.stack([later.real, later.imag], axis=1).reshape(pairs.shape)[:-1]
 
 
-def _exponents(bank: WaveBank) -> ComplexArray:
+def exponents(bank: WaveBank) -> ComplexArray:
+    """Exponents λ (bands,) 1/s of the oscillators: each one goes with exp(λ t)."""
     return np.asarray(-bank.damping + 1j * np.array(bank.waves.frequency), dtype=np.complex128)
+
+
+def foretelling(exponent: ComplexArray, ahead: FloatArray, rises: FloatArray, delay: float) -> ComplexArray:
+    """Factors f (A + R, bands) of the oscillators z for what ``WaveFilter.foretold`` tells: Σ Re(f z)."""
+    rate = np.exp(np.outer(ahead, exponent))
+    rise = np.expm1(np.outer(rises, exponent)) / exponent
+    return np.asarray(np.concatenate([rate, rise]) * np.exp(exponent * delay))
 
 
 class WaveFilter:
@@ -126,7 +134,7 @@ class WaveFilter:
     def __init__(self, rows: int, control_period: float, hold: int, bank: WaveBank) -> None:
         """``hold``: control steps between two readings of the depth."""
         self._schedule = schedule(bank, control_period, hold)
-        self._exponent = _exponents(bank)
+        self._exponent = exponents(bank)
         self._transition = np.append(np.exp(self._exponent * control_period), 1.0)
         self._state = np.zeros((rows, len(self._exponent) + 1), dtype=np.complex128)
         """The heave rate is the sum of the real parts of all but the last, m/s; the last is the offset, m."""
@@ -190,10 +198,7 @@ class WaveFilter:
     def _foretelling(self, ahead: bytes, rises: bytes, delay: float) -> ComplexArray:
         key = (ahead, rises, delay)
         if key not in self._factors:
-            now = np.exp(self._exponent * delay)
-            rate = np.exp(np.outer(np.frombuffer(ahead), self._exponent))
-            rise = np.expm1(np.outer(np.frombuffer(rises), self._exponent)) / self._exponent
-            self._factors[key] = np.concatenate([rate, rise]) * now
+            self._factors[key] = foretelling(self._exponent, np.frombuffer(ahead), np.frombuffer(rises), delay)
         return self._factors[key]
 
     def _sum(self, factors: ComplexArray) -> FloatArray:
