@@ -88,7 +88,8 @@ def _expected(source: ScenarioSource) -> ExpectedWaves:
     # As much as in a middling sea, not in the mean of all: gains go by the logarithm.
     each = np.array([line[1].sum() for line in lines])
     total = float(np.exp(np.log(np.maximum(each, LEAST_VARIANCE)).mean()))
-    floored = np.maximum(smooth / max(float(smooth.sum()), 1e-300), FLOOR / BANDS) * total
+    shares = smooth / smooth.sum() if smooth.any() else np.full(BANDS, 1.0 / BANDS)
+    floored = np.maximum(shares, FLOOR / BANDS) * total
     return ExpectedWaves(
         frequency=tuple(middle.tolist()), variance=tuple(floored.tolist()), build_up=float(scenarios[0].ramp)
     )
@@ -129,8 +130,11 @@ def _band(frequency: FloatArray, variance: FloatArray) -> tuple[float, float]:
     """Lowest and highest frequency [rad/s] of note."""
     order = np.argsort(frequency)
     mass = np.cumsum(variance[order])
-    if mass[-1] <= 0.0:
+    if not len(mass) or mass[-1] <= 0.0:
         return 0.3, 1.6
     low, high = frequency[order][np.searchsorted(mass, mass[-1] * np.array([OUTSIDE, 1.0 - OUTSIDE]))].tolist()
-    middle, half = 0.5 * (low + high), max(0.5 * (high - low), 0.5 * LEAST_WIDTH)
+    half = max(0.5 * (high - low), 0.5 * LEAST_WIDTH)
+    # A motion beyond is still met by bands of the least width, at the end that is next to it.
+    least, greatest = WIDEST[0] + 0.5 * LEAST_WIDTH, WIDEST[1] - 0.5 * LEAST_WIDTH
+    middle = min(max(0.5 * (low + high), least), greatest)
     return max(middle - half, WIDEST[0]), min(middle + half, WIDEST[1])

@@ -79,7 +79,7 @@ class Schedule:
 def schedule(bank: WaveBank, period: float, hold: int) -> Schedule:
     """Gains of the Kalman filter by the recursion of its covariance over 60 s."""
     steps = hold * round(60.0 / period / hold) + hold
-    exponent = _exponents(bank)
+    exponent = exponents(bank)
     bands, build_up = len(exponent), bank.waves.build_up
     transition = np.append(np.exp(exponent * period), 1.0)[:, None]
     rate = np.append(np.tile([1.0, 0.0], bands), 0.0)
@@ -116,7 +116,8 @@ def _propagated(transition: ComplexArray, columns: FloatArray) -> FloatArray:
     return np.stack([later.real, later.imag], axis=1).reshape(pairs.shape)[:-1]
 
 
-def _exponents(bank: WaveBank) -> ComplexArray:
+def exponents(bank: WaveBank) -> ComplexArray:
+    """Exponents λ (bands,) 1/s of the oscillators: each one goes with exp(λ t)."""
     return np.asarray(-bank.damping + 1j * np.array(bank.waves.frequency), dtype=np.complex128)
 
 
@@ -126,7 +127,7 @@ class WaveFilter:
     def __init__(self, rows: int, control_period: float, hold: int, bank: WaveBank) -> None:
         """``hold``: control steps between two readings of the depth."""
         self._schedule = schedule(bank, control_period, hold)
-        self._exponent = _exponents(bank)
+        self._exponent = exponents(bank)
         self._transition = np.append(np.exp(self._exponent * control_period), 1.0)
         self._state = np.zeros((rows, len(self._exponent) + 1), dtype=np.complex128)
         """The heave rate is the sum of the real parts of all but the last, m/s; the last is the offset, m."""

@@ -9,51 +9,74 @@ import torch
 
 from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.task import STATE
+from aframe_env.validation import InvalidValue
+from agents.control.regulator import LEAST_WEIGHT
 from agents.control.winch import WinchModel
-from agents.learned.features import LIMIT, STATE_FEATURES, coming_rise, of_the_state, wanted_turn
+from agents.learned.features import LIMIT, FeatureConfig, lift_features, load_features, wanted_turn
 
 _Invert = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 """(wanted turns, drum speeds), both (N,) float64 → commands (N,)."""
 
 
-class TensorStateFeatures:
-    """``StateFeatures`` of N rows that all have one crane. It has no memory: every call stands for itself."""
+class TensorFeatures:
+    """``Features`` of N rows on the full state, that all have one crane."""
 
-    names = STATE_FEATURES
-
-    def __init__(self, crane: Crane, control_period: float, *, cuda: bool) -> None:
+    def __init__(
+        self, rows: int, crane: Crane, config: FeatureConfig, device: torch.device | str, *, cuda: bool
+    ) -> None:
         """``cuda``: whether the tensors are on a CUDA device, or in numba's simulator of one."""
-        self._crane = crane
-        self._period = control_period
+        if config.sensors is not None:
+            raise InvalidValue("sensors: the features of tensors must be of the full state")
+        self._crane, self._period, self._action = crane, config.control_period, config.action
         self._invert: _Invert
         if cuda:
             from agents.control.winch_cuda import invert_winches
 
-            self._invert = partial(invert_winches, crane.winch, control_period)
+            self._invert = partial(invert_winches, crane.winch, config.control_period)
         else:
-            self._invert = _OnTheProcessor(crane, control_period)
+            self._invert = _OnTheProcessor(crane, config.control_period)
+        self._weight, self._frequency, self._rise, self._speed = torch.ones(
+            (4, rows), dtype=torch.float64, device=device
+        )
+        """(N,) weight N of the loads as the first tension told, frequency rad/s of their bobbing, and, at the last
+        look, rise m of the pulley in the coming control step and drum's speed rad/s."""
 
-    def look(self, observation: torch.Tensor) -> torch.Tensor:
-        """Features (N, F) float32 of observations (N, K) float32."""
+    def look(self, observation: torch.Tensor, first: torch.Tensor) -> torch.Tensor:
+        """Features (N, F) float32 of observations (N, K) float32, one control step after those of the last call.
+
+        ``first`` (N,) bool: rows at the first observation of their episode, whose past is forgotten.
+        """
         o = _columns(observation)
-        radius, axial_stiffness = self._crane.winch.drum_radius, self._crane.rope.axial_stiffness
-        mass, length = o["load_mass"], o["rope_length"]
-        first_length = length - radius * o["drum_angle"]
-        features = of_the_state(
-            torch,
-            o,
-            radius,
-            stretch=(o["rope_tension"] - mass * GRAVITY) * length / axial_stiffness,
-            frequency=torch.sqrt(axial_stiffness / (first_length * mass)),
+        self._weigh(o, first)
+        velocity, acceleration = o["pulley_velocity_z"], o["pulley_acceleration_z"]
+        self._rise = self._period * (velocity + 0.5 * self._period * acceleration)
+        self._speed = o["drum_speed"]
+        stretch = (o["rope_tension"] - self._weight) * o["rope_length"] / self._crane.rope.axial_stiffness
+        rope_end_speed = velocity - self._crane.winch.drum_radius * self._speed
+        z = (o["depth_error"], o["load_velocity_z"], o["depth_error"] + stretch, rope_end_speed)
+        features = (
+            *load_features(torch, z),
+            velocity,
+            acceleration,
+            *lift_features(o["pulley_heave"], self._weight / GRAVITY, o["rope_length"], self._frequency),
         )
         return torch.clip(torch.stack(features, dim=1), -LIMIT, LIMIT).to(torch.float32)
 
-    def command(self, observation: torch.Tensor, output: torch.Tensor) -> torch.Tensor:
-        """Drum speed commands (N, 1) rad/s for a network's output (N, 1), in [-1, 1], to observations (N, K)."""
-        o, winch = _columns(observation), self._crane.winch
-        rise = coming_rise(o, self._period)
-        turn = wanted_turn(torch, rise, output[:, 0].double(), winch.drum_radius, winch.max_acceleration, self._period)
-        return self._invert(turn, o["drum_speed"])[:, None].to(torch.float32)
+    def command(self, output: torch.Tensor) -> torch.Tensor:
+        """Drum speed commands (N, 1) rad/s for a network's output (N, 1), in [-1, 1], to the last look."""
+        winch, outputs = self._crane.winch, output[:, 0].double()
+        if self._action == "speed":
+            return (torch.clip(outputs, -1.0, 1.0) * winch.max_speed)[:, None].to(torch.float32)
+        turn = wanted_turn(torch, self._rise, outputs, winch.drum_radius, winch.max_acceleration, self._period)
+        return self._invert(turn, self._speed)[:, None].to(torch.float32)
+
+    def _weigh(self, o: dict[str, torch.Tensor], first: torch.Tensor) -> None:
+        """Weigh the loads of the ``first`` rows."""
+        # On all rows, and kept in those that begin: a choice of rows would have to wait for the device.
+        weight = torch.clip(o["rope_tension"], LEAST_WEIGHT, None)
+        frequency = torch.sqrt(self._crane.rope.axial_stiffness / (o["rope_length"] * (weight / GRAVITY)))
+        self._weight = torch.where(first, weight, self._weight)
+        self._frequency = torch.where(first, frequency, self._frequency)
 
 
 def _columns(observation: torch.Tensor) -> dict[str, torch.Tensor]:

@@ -9,8 +9,9 @@ import torch
 from aframe_env import InvalidValue, ScenarioDistribution, Sensors
 from aframe_env.config import TaskConfig
 from agents import load
+from agents.control.expected_waves import ExpectedWaves
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, card_text, digest, serialise
-from agents.learned.features import STATE_FEATURES
+from agents.learned.features import FEATURES
 from agents.learned.network import Actor
 from agents.policy import Knowledge
 from agents.registry import REGISTRY, BuildContext, choose, choose_all, slug
@@ -21,12 +22,14 @@ MAP = str(Path(__file__).parents[2] / "results" / "drive-map")
 
 def write_agent(folder, seed):
     torch.manual_seed(seed)
-    weights = serialise(Actor(len(STATE_FEATURES), 4))
+    weights = serialise(Actor(len(FEATURES), 4))
     card = AgentCard(
         algorithm="PPO",
         observation="state",
         sensors=None,
-        features=STATE_FEATURES,
+        waves=ExpectedWaves(frequency=(0.5, 1.0), variance=(0.1, 0.1), build_up=10.0),
+        action="residual",
+        features=FEATURES,
         hidden=4,
         control_period=0.1,
         seed=seed,
@@ -73,12 +76,25 @@ def test_every_name_can_be_typed_and_chosen(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["feed-forward + feedback (state)", "feed-forward + feedback", "inverse dynamics", "predictive control"]
+    ("name", "knows"),
+    [
+        ("feed-forward + feedback (state)", Knowledge.STATE),
+        ("feed-forward + feedback", Knowledge.SENSORS),
+        ("inverse dynamics", Knowledge.FUTURE),
+        ("predictive control (state)", Knowledge.STATE),
+        ("predictive control", Knowledge.SENSORS),
+    ],
 )
-def test_the_laws_are_there_with_what_they_know(name):
+def test_the_laws_are_there_with_what_they_know(name, knows):
     policy = choose(name).build(context())
-    assert policy.name == name
-    assert policy.knows in (Knowledge.STATE, Knowledge.SENSORS, Knowledge.FUTURE)
+    assert (policy.name, policy.knows) == (name, knows)
+
+
+@pytest.mark.parametrize("name", ["feed-forward + feedback", "predictive control", "predictive control (state)"])
+def test_the_laws_expect_the_waves_of_the_task(name):
+    config = TaskConfig(episode_duration=10.0, scenario=ScenarioDistribution(hs=(3.0, 4.0), ramp=0.0))
+    task = dataclasses.replace(context(), config=config)
+    assert choose(name).build(task).waves == ExpectedWaves.of(config.source) != ExpectedWaves.of(ScenarioDistribution())
 
 
 @pytest.mark.parametrize(

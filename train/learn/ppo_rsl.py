@@ -25,7 +25,7 @@ from aframe_env.cuda.device import open_device
 from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
 from aframe_env.validation import InvalidValue, require_integer
 from agents.learned.network import Actor
-from agents.learned.tensor_features import TensorStateFeatures
+from agents.learned.tensor_features import TensorFeatures
 from train.learn import ppo
 from train.learn.actor_critic import ActorLatent, CriticLatent, actor_of
 from train.learn.learner import Learner, LearnerSpec
@@ -182,7 +182,7 @@ def build(options: Options) -> Learner:
     env = AFrameHeaveTorchEnv(options.n_envs, config, device=options.device, seed=options.seed)
     rows = TrainingRows(
         env,
-        TensorStateFeatures(config.source.crane, options.control_period, cuda=options.device == "cuda"),
+        TensorFeatures(env.num_envs, config.source.crane, options.features, env.device, cuda=options.device == "cuda"),
         drift_limit=options.drift_limit,
         reward_scale=options.reward_scale,
         reward_knee=options.reward_knee,

@@ -8,7 +8,7 @@ from tensordict import TensorDict
 from aframe_env import task
 from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
 from agents.learned.interface import shaped
-from agents.learned.tensor_features import TensorStateFeatures
+from agents.learned.tensor_features import TensorFeatures
 from train.learn.sb3_env import median_reduction
 
 
@@ -20,7 +20,7 @@ class TrainingRows:
     def __init__(
         self,
         env: AFrameHeaveTorchEnv,
-        features: TensorStateFeatures,
+        features: TensorFeatures,
         *,
         drift_limit: float,
         reward_scale: float,
@@ -47,27 +47,27 @@ class TrainingRows:
 
     def reset(self) -> TensorDict:
         """Start all rows at random times of their episode."""
-        self._env.reset()
+        observation = self._env.reset()[GROUP]
+        self._present = self._features.look(observation, torch.ones_like(self.episode_length_buf, dtype=torch.bool))
         self.episode_length_buf = torch.randint_like(self.episode_length_buf, high=self.max_episode_length)
         return self.get_observations()
 
     def get_observations(self) -> TensorDict:
         """Return the present features, (N, F)."""
-        features = self._features.look(self._env.get_observations()[GROUP])
-        return TensorDict({GROUP: features}, batch_size=[self.num_envs], device=self.device)
+        return TensorDict({GROUP: self._present}, batch_size=[self.num_envs], device=self.device)
 
     def step(self, actions: torch.Tensor) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, torch.Tensor]]:
         """Advance with a network's outputs ``actions`` (N, 1); a row whose load has drifted far off starts anew."""
-        commands = self._features.command(self._env.get_observations()[GROUP], actions)
+        commands = self._features.command(actions)
         _, rewards, dones, extras = self._env.step(commands)
         final, cost = extras["final_obs"], -rewards.double()
         self._error_sum += cost
         self._still_sum += final[:, task.PULLEY_HEAVE].double().square() * self._period
         rewards = shaped(torch, cost / self._period, self._reward_scale, self._reward_knee).float()
         drifted = (final[:, task.DEPTH_ERROR].abs() > self._drift_limit) & ~dones
-        self._env.reset(drifted)
-        extras = {"time_outs": extras["time_outs"] | drifted}
-        return self.get_observations(), rewards, dones | drifted, extras
+        begun = dones | drifted
+        self._present = self._features.look(self._env.reset(drifted)[GROUP], begun)
+        return self.get_observations(), rewards, begun, {"time_outs": extras["time_outs"] | drifted}
 
     def pop_reduction(self) -> float:
         """Median over the rows of the heave reduction since the last call, exploration included."""

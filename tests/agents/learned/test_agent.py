@@ -1,4 +1,5 @@
 import json
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -7,25 +8,28 @@ import torch
 from aframe_env import InvalidValue, ScenarioDistribution
 from aframe_env.env import AFrameHeaveEnv
 from aframe_env.scenario.sensors import Sensors
-from aframe_env.task import SENSED, STATE
+from agents.control.expected_waves import ExpectedWaves
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, load, serialise
-from agents.learned.features import feature_names
+from agents.learned.features import FEATURES
 from agents.learned.network import Actor
 from agents.policy import Knowledge
 from agents.rollout import held_out_scenarios, run
 
 
-def agent(observation="state", hidden=8):
+WAVES = ExpectedWaves(frequency=(0.5, 0.7, 0.9, 1.2), variance=(0.05, 0.1, 0.1, 0.05), build_up=5.0)
+
+
+def agent(observation="state", hidden=8, action="residual"):
     torch.manual_seed(1)
-    quantities = STATE if observation == "state" else SENSED
-    names = feature_names(quantities)
-    actor = Actor(len(names), hidden)
+    actor = Actor(len(FEATURES), hidden)
     weights = serialise(actor)
     card = AgentCard(
         algorithm="PPO",
         observation=observation,
         sensors=None if observation == "state" else Sensors(),
-        features=names,
+        waves=WAVES,
+        action=action,
+        features=FEATURES,
         hidden=hidden,
         control_period=0.1,
         seed=7,
@@ -41,12 +45,15 @@ def write(folder, policy, weights, **changes):
     (folder / CARD).write_text(json.dumps({**json.loads(card_text(policy.card)), **changes}))
 
 
+@pytest.mark.parametrize("action", ["residual", "speed"])
 @pytest.mark.parametrize("observation", ["state", "sensors"])
-def test_an_agent_comes_back_from_its_folder_as_it_was(observation, tmp_path):
-    policy, weights = agent(observation)
+def test_an_agent_comes_back_from_its_folder_as_it_was(observation, action, tmp_path):
+    policy, weights = agent(observation, action=action)
     write(tmp_path, policy, weights)
     again = load(tmp_path)
     assert again.card == policy.card
+    assert again.card.made_for == policy.card.made_for
+    assert (again.card.made_for.waves, again.card.made_for.action) == (WAVES, action)
     assert again.knows is (Knowledge.STATE if observation == "state" else Knowledge.SENSORS)
     env = AFrameHeaveEnv(observation=observation)
     observed, _ = env.reset(seed=0)
@@ -59,10 +66,13 @@ def test_an_agent_comes_back_from_its_folder_as_it_was(observation, tmp_path):
     [
         ({"sha256": "0" * 64}, "does not match the sha256"),
         ({"format": 99}, "format = 99"),
+        ({"format": 2}, "this version reads format 3"),
+        ({"action": "force"}, r"\[action\] force not in literal"),
+        ({"waves": {**asdict(WAVES), "build_up": -1.0}}, "build_up = -1.0 s"),
         ({"hidden": "8"}, r"\[hidden\] '8': must be of type int"),
         ({"hidden": 9}, "not the weights of the network"),
         ({"surprise": 1}, "unknown key 'surprise'"),
-        ({"features": [f"x{i}" for i in range(11)]}, "the agent's features are"),
+        ({"features": [f"x{i}" for i in range(len(FEATURES))]}, "the agent's features are"),
     ],
 )
 def test_files_that_do_not_belong_together_are_refused(changes, words, tmp_path):

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aframe_env import Crane, Rope, Winch
+from aframe_env import Crane, InvalidValue, Rope, Sensors, Winch
 from aframe_env.task import STATE
-from agents.learned.features import StateFeatures
-from agents.learned.tensor_features import TensorStateFeatures
+from agents.control.expected_waves import ExpectedWaves
+from agents.learned.features import FEATURES, FeatureConfig, Features
+from agents.learned.tensor_features import TensorFeatures
 
 RANGES = {
     "depth_error": (-30.0, 30.0),
@@ -23,6 +25,16 @@ RANGES = {
     "rope_length": (50.0, 2000.0),
 }
 """Of an observation's quantities; ± 5 for the others."""
+WAVES = st.builds(
+    lambda low, width, bands, variance, build_up: ExpectedWaves(
+        frequency=tuple(np.linspace(low, low + width, bands)), variance=(variance,) * bands, build_up=build_up
+    ),
+    low=st.floats(0.3, 0.6),
+    width=st.floats(0.3, 1.2),
+    bands=st.integers(2, 12),
+    variance=st.floats(1e-5, 0.05),
+    build_up=st.sampled_from([0.0, 3.0]),
+)
 
 
 def observations(rng: np.random.Generator, rows: int) -> np.ndarray:
@@ -30,28 +42,60 @@ def observations(rng: np.random.Generator, rows: int) -> np.ndarray:
     return rng.uniform(low, high, (rows, len(STATE))).astype(np.float32)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     seed=st.integers(0, 2**32),
     rows=st.integers(1, 20),
-    period=st.floats(0.05, 0.5),
+    period=st.sampled_from([0.05, 0.1, 0.25, 0.5]),
     diameter=st.floats(0.5, 3.0),
     lag=st.sampled_from([0.0, 0.2]),
     stiffness=st.floats(5e7, 5e8),
+    waves=WAVES,
+    action=st.sampled_from(["residual", "speed"]),
 )
 def test_features_and_commands_are_those_of_arrays(
-    seed: int, rows: int, period: float, diameter: float, lag: float, stiffness: float
+    seed: int, rows: int, period: float, diameter: float, lag: float, stiffness: float, waves: ExpectedWaves, action: str
 ) -> None:
+    """Over many steps in which single rows begin anew, whatever the observations."""
     crane = Crane(winch=Winch(drum_diameter=diameter, lag=lag), rope=Rope(axial_stiffness=stiffness))
+    config = FeatureConfig(control_period=period, waves=waves, action=action)  # type: ignore[arg-type]
     rng = np.random.default_rng(seed)
-    arrays, tensors = StateFeatures(rows, period), TensorStateFeatures(crane, period, cuda=False)
-    first = observations(rng, rows)
-    first[:, [quantity.name for quantity in STATE].index("drum_angle")] = 0.0  # as at a start
-    # Single precision: what the features are rounded to.
-    np.testing.assert_allclose(
-        tensors.look(torch.from_numpy(first)), arrays.start(first, [crane] * rows), rtol=1e-6, atol=1e-6
-    )
-    output = rng.uniform(-1.5, 1.5, rows)
-    commands = tensors.command(torch.from_numpy(first), torch.from_numpy(output[:, None].astype(np.float32)))
-    assert commands.shape == (rows, 1)
-    np.testing.assert_allclose(commands[:, 0], arrays.command(output), rtol=1e-5, atol=1e-5)
+    arrays, tensors = Features(rows, config), TensorFeatures(rows, crane, config, "cpu", cuda=False)
+    first = np.ones(rows, dtype=np.bool_)
+    for step in range(30):
+        observed = observations(rng, rows)
+        want = arrays.advance(observed) if step else np.empty((rows, len(FEATURES)), dtype=np.float32)
+        begun = np.flatnonzero(first)
+        if len(begun):
+            want[begun] = arrays.start(observed[begun], [crane] * len(begun), begun)
+        got = tensors.look(torch.from_numpy(observed), torch.from_numpy(first))
+        assert got.dtype == torch.float32
+        # Single precision: what the features are rounded to.
+        np.testing.assert_allclose(got, want, rtol=1e-6, atol=1e-6)
+        output = rng.uniform(-1.5, 1.5, rows)
+        commands = tensors.command(torch.from_numpy(output[:, None]))
+        assert commands.shape == (rows, 1)
+        np.testing.assert_allclose(commands[:, 0], arrays.command(output), rtol=1e-5, atol=1e-5)
+        first = rng.uniform(size=rows) < 0.1
+
+
+def test_gains_repeat_after_their_schedule() -> None:
+    """A minute and more on, with the waves of the default task."""
+    crane, config = Crane(), FeatureConfig()
+    arrays, tensors = Features(2, config), TensorFeatures(2, crane, config, "cpu", cuda=False)
+    rng = np.random.default_rng(1)
+    observed = observations(rng, 2)
+    arrays.start(observed, [crane] * 2)
+    tensors.look(torch.from_numpy(observed), torch.ones(2, dtype=torch.bool))
+    going_on = torch.zeros(2, dtype=torch.bool)
+    for step in range(650):
+        observed[:, :9] = observations(rng, 2)[:, :9]
+        observed[:, [quantity.name for quantity in STATE].index("pulley_velocity_z")] = np.sin(0.08 * step), 0.2
+        got, want = tensors.look(torch.from_numpy(observed), going_on), arrays.advance(observed)
+    np.testing.assert_allclose(got, want, rtol=1e-5, atol=1e-5)
+    assert np.abs(want).max() < 20.0 + 1e-6
+
+
+def test_sensors_are_refused() -> None:
+    with pytest.raises(InvalidValue, match="must be of the full state"):
+        TensorFeatures(1, Crane(), FeatureConfig(sensors=Sensors()), "cpu", cuda=False)

@@ -14,7 +14,7 @@ import aframe_env
 from aframe_env import InvalidValue, ScenarioDistribution
 from agents import AgentInterface, AgentVectorInterface, FeaturePolicy, InterfaceConfig
 from agents.learned.agent import output_zero
-from agents.learned.features import SENSED_FEATURES, STATE_FEATURES, features_for
+from agents.learned.features import FEATURES, FeatureConfig, Features
 from agents.rollout import held_out_scenarios, run
 
 OBSERVATIONS = pytest.mark.parametrize("observation", ["state", "sensors"])
@@ -40,17 +40,18 @@ def outputs(steps, rows, seed=1):
     return np.random.default_rng(seed).uniform(-1.0, 1.0, (steps, rows, 1)).astype(np.float32)
 
 
+@pytest.mark.parametrize("action", ["residual", "speed"])
 @OBSERVATIONS
-def test_observations_are_the_agents_own_features(observation):
-    env, bare = AgentInterface(scalar(observation)), scalar(observation)
+def test_observations_are_the_agents_own_features(observation, action):
+    env, bare = AgentInterface(scalar(observation), action=action), scalar(observation)
     seen, _ = env.reset(seed=3)
     first, _ = bare.reset(seed=3)
-    features = features_for(1, 0.1, bare.unwrapped.simulation.config.sensors)
-    assert env.feature_names == features.names
+    features = Features(1, FeatureConfig.of(bare.unwrapped.simulation.config, action))
+    assert env.feature_names == FEATURES
     np.testing.assert_array_equal(seen, features.start(first[None], [bare.unwrapped.scenario.crane])[0])
-    for action in outputs(40, 1)[:, 0]:
-        seen, _, _, _, info = env.step(action)
-        observed, _, _, _, same = bare.step(features.command(action.astype(np.float64)))
+    for output in outputs(40, 1)[:, 0]:
+        seen, _, _, _, info = env.step(output)
+        observed, _, _, _, same = bare.step(features.command(output.astype(np.float64)))
         np.testing.assert_array_equal(seen, features.advance(observed[None])[0])
         assert info["omega1"] == same["omega1"]
 
@@ -61,8 +62,8 @@ def test_an_output_of_zero_is_the_hand_written_base(observation):
     env.reset(seed=4)
     for _ in range(100):
         info = env.step(np.zeros(1, dtype=np.float32))[-1]
-    sensors = env.unwrapped.simulation.config.sensors
-    base, bare = output_zero(sensors, 0.1), scalar(observation)
+    made_for = FeatureConfig.of(env.unwrapped.simulation.config)
+    base, bare = output_zero(made_for), scalar(observation)
     observed, _ = bare.reset(seed=4)
     base.reset([bare.unwrapped.scenario], 0.1)
     for step in range(100):
@@ -153,12 +154,12 @@ def test_staggered_rows_end_one_after_the_other():
 
 def test_privileged_features_stand_behind_the_agents():
     env = AgentInterface(scalar("sensors"), privileged=True)
-    assert env.actor_inputs == len(SENSED_FEATURES)
-    assert env.feature_names[env.actor_inputs :] == tuple(f"true_{name}" for name in STATE_FEATURES)
+    assert env.actor_inputs == len(FEATURES)
+    assert env.feature_names[env.actor_inputs :] == tuple(f"true_{name}" for name in FEATURES)
     seen, _ = env.reset(seed=2)
     alike, _ = AgentInterface(scalar("sensors")).reset(seed=2)
     np.testing.assert_array_equal(seen[: env.actor_inputs], alike)
-    assert AgentInterface(scalar(), privileged=True).feature_names == STATE_FEATURES
+    assert AgentInterface(scalar(), privileged=True).feature_names == FEATURES
 
 
 @OBSERVATIONS
@@ -182,11 +183,11 @@ def test_its_spec_makes_it_again_and_it_can_be_copied():
 @OBSERVATIONS
 def test_what_acts_on_the_features_runs_in_the_comparison(observation):
     scenarios = held_out_scenarios(ScenarioDistribution(), 3)
-    sensors = aframe_env.TaskConfig(observation=observation).sensors
-    zero = FeaturePolicy(lambda features: np.zeros((len(features), 1), dtype=np.float32), sensors)
+    made_for = FeatureConfig.of(aframe_env.TaskConfig(observation=observation))
+    zero = FeaturePolicy(lambda features: np.zeros((len(features), 1), dtype=np.float32), made_for)
     got, want = (
         run(policy, scenarios, observation=observation, episode_duration=5.0)
-        for policy in (zero, output_zero(sensors, 0.1))
+        for policy in (zero, output_zero(made_for))
     )
     np.testing.assert_array_equal(got.error, want.error)
 
@@ -210,9 +211,10 @@ def test_outputs_that_are_none_are_refused(function, words):
         (lambda: AgentInterface(gymnasium.make("Pendulum-v1")), "must be AFrameHeaveEnv"),
         (lambda: AgentInterface(RescaleAction(scalar(), np.float32(-1), np.float32(1))), "as they are"),
         (lambda: AgentVectorInterface(gymnasium.make_vec(aframe_env.ENV_ID, 2, "sync")), "must be AFrameHeaveVector"),
-        (lambda: AgentInterface(scalar(), drift=1.0), "unknown argument 'drift': must be one of drift_limit"),
+        (lambda: AgentInterface(scalar(), drift=1.0), "unknown argument 'drift': must be one of action, drift_limit"),
         (lambda: AgentInterface(scalar(), drift_limit=0.0), r"drift_limit = 0.0 m: must be in \(0, 1000\] m"),
         (lambda: AgentInterface(scalar(), horizon=-1.0), r"horizon = -1.0 s"),
+        (lambda: AgentInterface(scalar(), action="mine"), "action = 'mine': must be one of 'residual', 'speed'"),
         (lambda: AgentInterface(scalar(), reward="mine"), "reward = 'mine': must be one of 'training', 'task'"),
     ],
 )

@@ -16,7 +16,8 @@ pytest.importorskip("rsl_rl", reason='rsl-rl-lib is not installed (extra "cuda")
 from aframe_env import ScenarioDistribution
 from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
 from agents.learned.agent import load
-from agents.learned.tensor_features import TensorStateFeatures
+from agents.learned.features import Action, FeatureConfig, Features
+from agents.learned.tensor_features import TensorFeatures
 from train.learn import ppo_rsl
 from train.learn.ppo_rsl import Options
 from train.learn.rsl_env import TrainingRows
@@ -33,7 +34,7 @@ def command(monkeypatch: pytest.MonkeyPatch, learner: str, *arguments: object) -
 def rows(drift_limit: float = 10.0, source: ScenarioDistribution | None = None) -> TrainingRows:
     source = source or ScenarioDistribution()
     env = AFrameHeaveTorchEnv(6, scenario=source, episode_duration=5.0, device="cpu")
-    features = TensorStateFeatures(source.crane, 0.1, cuda=False)
+    features = TensorFeatures(6, source.crane, FeatureConfig(), "cpu", cuda=False)
     return TrainingRows(env, features, drift_limit=drift_limit, reward_scale=2.0, reward_knee=1.0)
 
 
@@ -41,15 +42,15 @@ def test_the_reward_is_the_shaped_root_mean_square() -> None:
     training = rows(source=ScenarioDistribution(hs=4.0, ramp=0.0))
     training.episode_length_buf.zero_()
     plain = AFrameHeaveTorchEnv(6, scenario=ScenarioDistribution(hs=4.0, ramp=0.0), episode_duration=5.0, device="cpu")
-    plain.reset()
+    features = TensorFeatures(6, ScenarioDistribution().crane, FeatureConfig(), "cpu", cuda=False)
+    observation, none = plain.reset()[GROUP], torch.zeros(6, dtype=torch.bool)
+    features.look(observation, ~none)
     generator = torch.Generator().manual_seed(0)
     for _ in range(20):
         output = torch.rand((6, 1), generator=generator) - 0.5
-        commands = TensorStateFeatures(ScenarioDistribution().crane, 0.1, cuda=False).command(
-            plain.get_observations()[GROUP], output
-        )
         _, shaped, _, _ = training.step(output)
-        _, reward, _, _ = plain.step(commands)
+        observations, reward, _, _ = plain.step(features.command(output))
+        features.look(observations[GROUP], none)
         torch.testing.assert_close(shaped, -2.0 * torch.log1p(torch.sqrt(-reward / 0.1)), rtol=1e-4, atol=1e-6)
 
 
@@ -64,6 +65,44 @@ def test_a_drifting_row_starts_anew_with_its_value() -> None:
             assert step > 3
             return
     raise AssertionError("no row has drifted off")
+
+
+def test_to_look_twice_is_to_look_once() -> None:
+    looked, unlooked = rows(), rows()
+    for training in (looked, unlooked):
+        training.episode_length_buf.zero_()
+    for _ in range(5):
+        looked.get_observations()
+        seen, want = (training.step(torch.full((6, 1), 0.2))[0][GROUP] for training in (looked, unlooked))
+        assert torch.equal(seen, want)
+        assert torch.equal(looked.get_observations()[GROUP], want)
+
+
+@pytest.mark.parametrize("action", ["residual", "speed"])
+def test_features_across_restarts_are_those_of_the_agents(action: Action) -> None:
+    """Rows that drift off, and rows whose time is over, begin anew; each as the agents' own features do."""
+    source = ScenarioDistribution(hs=3.0)
+    config = FeatureConfig(action=action)
+    env = AFrameHeaveTorchEnv(6, scenario=source, episode_duration=3.0, device="cpu", seed=4)
+    features = TensorFeatures(6, source.crane, config, "cpu", cuda=False)
+    training = TrainingRows(env, features, drift_limit=0.4, reward_scale=2.0, reward_knee=1.0)
+    arrays = Features(6, config)
+    observed = env.get_observations()[GROUP].numpy()
+    want = arrays.start(observed, [source.crane] * 6)
+    np.testing.assert_allclose(training.get_observations()[GROUP], want, rtol=1e-5, atol=1e-5)
+    generator, restarts = torch.Generator().manual_seed(2), 0
+    for _ in range(70):
+        outputs = 2.0 * torch.rand((6, 1), generator=generator) - 0.7
+        arrays.command(outputs[:, 0].double().numpy())
+        seen, _, dones, _ = training.step(outputs)
+        observed = env.get_observations()[GROUP].numpy()
+        want = arrays.advance(observed)
+        begun = np.flatnonzero(dones.numpy())
+        if len(begun):
+            want[begun] = arrays.start(observed[begun], [source.crane] * len(begun), begun)
+        np.testing.assert_allclose(seen[GROUP], want, rtol=1e-5, atol=1e-5)
+        restarts += len(begun)
+    assert restarts > 12
 
 
 def test_rows_start_at_random_times_of_their_episode() -> None:
@@ -86,7 +125,7 @@ def test_a_run_from_start_to_an_agent_that_steps_the_environment(
     assert len(log) == 1 + 512 // (16 * 8)
     assert "train/surrogate" in log[0]
     agent = load(tmp_path / "a")
-    assert (agent.card.algorithm, agent.card.seed, agent.card.timesteps) == ("PPO", 3, 512)
+    assert (agent.card.algorithm, agent.card.seed, agent.card.timesteps) == ("residual PPO", 3, 512)
     env = gymnasium.make("AFrameHeave-v0")
     observation, _ = env.reset(seed=0)
     for step in range(3):
