@@ -11,7 +11,7 @@ from aframe_env.config import TaskConfig
 from agents import load
 from agents.control.expected_waves import ExpectedWaves
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, card_text, digest, serialise
-from agents.learned.features import FEATURES
+from agents.learned.features import STATE_FEATURES
 from agents.learned.network import Actor
 from agents.policy import Knowledge
 from agents.registry import REGISTRY, BuildContext, choose, choose_all, slug
@@ -22,14 +22,14 @@ MAP = str(Path(__file__).parents[2] / "results" / "drive-map")
 
 def write_agent(folder, seed):
     torch.manual_seed(seed)
-    weights = serialise(Actor(len(FEATURES), 4))
+    weights = serialise(Actor(len(STATE_FEATURES), 4))
     card = AgentCard(
         algorithm="PPO",
         observation="state",
         sensors=None,
         waves=ExpectedWaves(frequency=(0.5, 1.0), variance=(0.1, 0.1), build_up=10.0),
         action="residual",
-        features=FEATURES,
+        features=STATE_FEATURES,
         hidden=4,
         control_period=0.1,
         seed=seed,

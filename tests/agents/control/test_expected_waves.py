@@ -97,7 +97,9 @@ def test_of_a_regular_wave_it_is_at_its_frequency(period):
     assert waves.build_up == 0.0
 
 
-@pytest.mark.parametrize(("period", "end"), [(1.0, WIDEST[1]), (2.0, WIDEST[1]), (120.0, WIDEST[0]), (900.0, WIDEST[0])])
+@pytest.mark.parametrize(
+    ("period", "end"), [(1.0, WIDEST[1]), (2.0, WIDEST[1]), (120.0, WIDEST[0]), (900.0, WIDEST[0])]
+)
 def test_a_motion_beyond_the_bands_is_in_those_at_that_end(period, end):
     motion = HarmonicMotion(harmonics=(Harmonic(coordinate="heave", amplitude=0.5, period=period),))
     waves = ExpectedWaves.of(Scenario(motion=motion))

@@ -262,7 +262,7 @@ def test_a_load_pin_that_is_off_by_a_tenth_is_borne(make, factor):
     ids=["feedback", "predictive control"],
 )
 def test_a_ship_that_moves_already_costs_the_sensors_little(make):
-    """Most of what is left is of the task: the load begins off its level. Told of it, the filters add little to that."""
+    """Most of what is left is the task's: the load begins off its level. Told of it, the filters add little to that."""
     source = ScenarioDistribution(ramp=0.0)
     scenarios = held_out_scenarios(source, 24)
     expected, from_rest = (ExpectedWaves.of(each) for each in (source, ScenarioDistribution()))

@@ -107,21 +107,21 @@ def test_a_row_alone_acts_as_in_a_batch(sensors):
 
 
 def wanted(policy, **told):
-    """Drum angles (N,) rad wanted after half a minute of one heave of 1 m, with loads and ropes as told (N,)."""
+    """Drum angles (N,) rad wanted after half a minute of one heave of 1 m, with readings and ropes (N,) like these."""
     rows = len(next(iter(told.values())))
     policy.reset([Scenario()] * rows, PERIOD)
     for step in range(300):
         time = PERIOD * step
-        read = {"load_mass": 5e4, "rope_length": 300.0, **told}
+        read = {"rope_tension": 5e4 * 9.81, "rope_length": 300.0, **told}
         read["pulley_velocity_z"] = FREQUENCY * np.cos(FREQUENCY * time) * min(time / 10.0, 1.0)
         columns = [np.broadcast_to(read.get(q.name, 0.0), rows) for q in SENSED]
         policy.act(np.stack(columns, axis=1).astype(np.float32), time)
     return policy.wanted(np.zeros(1))[0]
 
 
-def test_the_load_that_it_is_told_changes_the_ratio_as_in_the_closed_form():
+def test_the_load_that_it_weighs_changes_the_ratio_as_in_the_closed_form():
     mass = np.array([2e4, 5e4, 1e5])
-    angle = wanted(RealTimeMapPolicy(SHIPPED), load_mass=mass)
+    angle = wanted(RealTimeMapPolicy(SHIPPED), rope_tension=9.81 * mass)
     closed = 1.0 / (1.0 + mass * 9.81 / 2.0e8)
     assert abs(angle).min() > 0.5
     np.testing.assert_allclose(angle / angle[0], closed / closed[0], atol=5e-4)

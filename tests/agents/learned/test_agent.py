@@ -10,26 +10,27 @@ from aframe_env.env import AFrameHeaveEnv
 from aframe_env.scenario.sensors import Sensors
 from agents.control.expected_waves import ExpectedWaves
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, load, serialise
-from agents.learned.features import FEATURES
+from agents.learned.features import STATE_FEATURES, feature_names
 from agents.learned.network import Actor
 from agents.policy import Knowledge
 from agents.rollout import held_out_scenarios, run
-
 
 WAVES = ExpectedWaves(frequency=(0.5, 0.7, 0.9, 1.2), variance=(0.05, 0.1, 0.1, 0.05), build_up=5.0)
 
 
 def agent(observation="state", hidden=8, action="residual"):
     torch.manual_seed(1)
-    actor = Actor(len(FEATURES), hidden)
+    sensors = None if observation == "state" else Sensors()
+    features = feature_names(sensors)
+    actor = Actor(len(features), hidden)
     weights = serialise(actor)
     card = AgentCard(
         algorithm="PPO",
         observation=observation,
-        sensors=None if observation == "state" else Sensors(),
+        sensors=sensors,
         waves=WAVES,
         action=action,
-        features=FEATURES,
+        features=features,
         hidden=hidden,
         control_period=0.1,
         seed=7,
@@ -72,7 +73,7 @@ def test_an_agent_comes_back_from_its_folder_as_it_was(observation, action, tmp_
         ({"hidden": "8"}, r"\[hidden\] '8': must be of type int"),
         ({"hidden": 9}, "not the weights of the network"),
         ({"surprise": 1}, "unknown key 'surprise'"),
-        ({"features": [f"x{i}" for i in range(len(FEATURES))]}, "the agent's features are"),
+        ({"features": [f"x{i}" for i in range(len(STATE_FEATURES))]}, "the agent's features are"),
     ],
 )
 def test_files_that_do_not_belong_together_are_refused(changes, words, tmp_path):

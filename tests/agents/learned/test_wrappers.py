@@ -14,7 +14,7 @@ import aframe_env
 from aframe_env import InvalidValue, ScenarioDistribution
 from agents import AgentInterface, AgentVectorInterface, FeaturePolicy, InterfaceConfig
 from agents.learned.agent import output_zero
-from agents.learned.features import FEATURES, FeatureConfig, Features
+from agents.learned.features import SENSED_FEATURES, STATE_FEATURES, FeatureConfig, Features
 from agents.rollout import held_out_scenarios, run
 
 OBSERVATIONS = pytest.mark.parametrize("observation", ["state", "sensors"])
@@ -47,7 +47,7 @@ def test_observations_are_the_agents_own_features(observation, action):
     seen, _ = env.reset(seed=3)
     first, _ = bare.reset(seed=3)
     features = Features(1, FeatureConfig.of(bare.unwrapped.simulation.config, action))
-    assert env.feature_names == FEATURES
+    assert env.feature_names == features.names
     np.testing.assert_array_equal(seen, features.start(first[None], [bare.unwrapped.scenario.crane])[0])
     for output in outputs(40, 1)[:, 0]:
         seen, _, _, _, info = env.step(output)
@@ -154,12 +154,12 @@ def test_staggered_rows_end_one_after_the_other():
 
 def test_privileged_features_stand_behind_the_agents():
     env = AgentInterface(scalar("sensors"), privileged=True)
-    assert env.actor_inputs == len(FEATURES)
-    assert env.feature_names[env.actor_inputs :] == tuple(f"true_{name}" for name in FEATURES)
+    assert env.actor_inputs == len(SENSED_FEATURES)
+    assert env.feature_names[env.actor_inputs :] == tuple(f"true_{name}" for name in STATE_FEATURES)
     seen, _ = env.reset(seed=2)
     alike, _ = AgentInterface(scalar("sensors")).reset(seed=2)
     np.testing.assert_array_equal(seen[: env.actor_inputs], alike)
-    assert AgentInterface(scalar(), privileged=True).feature_names == FEATURES
+    assert AgentInterface(scalar(), privileged=True).feature_names == STATE_FEATURES
 
 
 @OBSERVATIONS

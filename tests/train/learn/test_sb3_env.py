@@ -8,7 +8,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from aframe_env import ScenarioDistribution
 from aframe_env.config import TaskConfig
 from aframe_env.env import AFrameHeaveEnv
-from agents.learned.features import FEATURES, FeatureConfig, Features
+from agents.learned.features import STATE_FEATURES, FeatureConfig, Features
 from agents.learned.interface import InterfaceConfig
 from train.learn import ppo, sac
 from train.learn.sb3_env import TrainingVecEnv
@@ -104,7 +104,7 @@ def test_what_the_critics_see_beyond_the_sensors_does_not_move_the_agent():
     other = observed.copy()
     other[:, learner.rows.actor_inputs :] += 1.0
     policy = learner.model.policy
-    assert observed.shape[1] == learner.rows.actor_inputs + len(FEATURES)
+    assert observed.shape[1] == learner.rows.actor_inputs + len(STATE_FEATURES)
     with torch.no_grad():
         values = [policy.predict_values(torch.from_numpy(x)) for x in (observed, other)]
     np.testing.assert_array_equal(*[learner.model.predict(x, deterministic=True)[0] for x in (observed, other)])
