@@ -18,9 +18,9 @@ from agents.control.observer import Observer, observer_for
 from agents.control.regulator import Gains, HoistBatch, Observation, Regulator
 from agents.policy import FloatArray, Knowledge
 
-STATE_GAINS = Gains(effort=0.087, share=0.018)
+STATE_GAINS = Gains(effort=0.093, share=0.017)
 """Tuned with ``python -m train.tune_control``."""
-SENSOR_GAINS = Gains(effort=0.026, share=0.049)
+SENSOR_GAINS = Gains(effort=0.15, share=0.019)
 """Tuned with ``python -m train.tune_control``."""
 
 

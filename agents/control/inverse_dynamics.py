@@ -14,7 +14,7 @@ from aframe_env.task import STATE
 from agents.control.regulator import Gains, HoistBatch, Observation, Regulator
 from agents.policy import FloatArray, Knowledge
 
-GAINS = Gains(effort=0.069, share=0.016)
+GAINS = Gains(effort=0.095, share=0.012)
 """Tuned with ``python -m train.tune_control``."""
 
 

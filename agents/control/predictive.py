@@ -23,9 +23,9 @@ from agents.control.regulator import HoistBatch, Observation
 from agents.control.rope import RopeModel
 from agents.policy import FloatArray, Knowledge
 
-STATE_EFFORT = 0.026
+STATE_EFFORT = 0.0094
 """Tuned with ``python -m train.tune_control``, s²."""
-SENSOR_EFFORT = 0.05
+SENSOR_EFFORT = 0.017
 """Tuned with ``python -m train.tune_control``, s²."""
 
 

@@ -19,12 +19,13 @@ def command(monkeypatch, *arguments):
 def test_the_committed_agent_is_as_good_as_the_results_say(model, drives, tmp_path, monkeypatch):
     out = tmp_path / "out"
     few = ("--scenarios", 12, "--privileged", 0, "--no-report", "--out", out)
-    assert command(monkeypatch, "--policies", AGENT, MAP, *drives, "--model", model, *few) == 0
+    assert command(monkeypatch, "--policies", AGENT, MAP, "output zero", *drives, "--model", model, *few) == 0
     rows = {row["policy"]: row for row in json.loads((out / "comparison.json").read_text(encoding="utf-8"))["policies"]}
-    assert rows["PPO"]["reduction"]["value"] > 0.95
-    assert rows["PPO"]["worse_than_still"] == 0
+    # Better than the hand-written base alone: something was learned.
+    assert rows["residual PPO"]["reduction"]["value"] > rows["output zero"]["reduction"]["value"] + 0.001
+    assert rows["residual PPO"]["worse_than_still"] == 0
     assert {*drives, "drive map by the clock"} <= set(rows)
-    assert all(row["knows"] == "clock" for name, row in rows.items() if name not in ("PPO", "drum still"))
+    assert all(row["knows"] == "clock" for name, row in rows.items() if name not in ("residual PPO", "output zero", "drum still"))
     assert json.loads((out / "run.json").read_text())["command"].startswith("python -m train.evaluate --policies")
 
 

@@ -27,7 +27,7 @@ def test_a_run_from_start_to_comparison(tmp_path, monkeypatch):
     assert run["versions"]["torch"]
     assert json.loads((out / "metrics.json").read_text())["timesteps"] >= 512
     rows = {row["policy"]: row for row in json.loads((out / "comparison.json").read_text(encoding="utf-8"))["policies"]}
-    assert list(rows) == ["drum still", "PPO", *compared]
+    assert list(rows) == ["drum still", "residual PPO", *compared]
     assert rows["S-Ω1"]["scenarios"] == 3
     assert rows["S-Ω1 for each scenario"]["scenarios"] == 1
     assert "privileged" in rows["S-Ω1 for each scenario"]["knows"]
