@@ -154,8 +154,9 @@ class Simulation:
         self._report(self._engine.blocks, self.episode_duration, rows, self.state, self.results)
 
     def _known(self) -> FloatArray:
-        """Mass and nominal unstretched rope length, known to the operator before the lift, (rows, 2)."""
-        mass = self._engine.read(at.MASS)
+        """Mass, if it is told, and nominal unstretched rope length: known before the lift, (rows, 2)."""
+        assert self.config.sensors is not None
+        mass = self._engine.read(at.MASS) * self.config.sensors.mass_told
         return np.stack([mass, self._engine.read(at.FREE_LENGTH)], axis=1)
 
     def _sensed_truth(self) -> FloatArray:

@@ -48,6 +48,8 @@ class Sensors:
 
     delay: float = 0.1
     """Time from a motion to its reading, s; for all channels."""
+    mass_told: bool = True
+    """False: the load's mass is not told before the lift, and ``load_mass`` reads 0."""
     heave: Channel = field(default_factory=lambda: Channel(noise=0.05, relative_noise=0.05, correlation_time=30.0))
     """Pulley's vertical displacement, m."""
     heave_rate: Channel = field(default_factory=lambda: Channel(noise=0.01, relative_noise=0.01))
@@ -67,6 +69,8 @@ class Sensors:
 
     def __post_init__(self) -> None:
         require_number("delay", self.delay, "s", low=0.0, high=10.0)
+        if not isinstance(self.mass_told, bool):
+            raise InvalidValue(f"mass_told = {self.mass_told!r}: must be True or False")
         for name in CHANNELS:
             if not isinstance(getattr(self, name), Channel):
                 raise InvalidValue(f"{name} = {getattr(self, name)!r}: must be a Channel")

@@ -233,6 +233,15 @@ def test_the_told_mass_is_of_no_account(make, observation):
 
 
 @pytest.mark.parametrize("make", SENSED_LAWS.values(), ids=SENSED_LAWS)
+def test_a_mass_that_is_not_told_is_not_missed(make):
+    scenarios = held_out_scenarios(ScenarioDistribution(), 3)
+    told, untold = (
+        run(make(), scenarios, observation=Sensors(mass_told=known), episode_duration=10.0) for known in (True, False)
+    )
+    np.testing.assert_array_equal(told.error, untold.error)
+
+
+@pytest.mark.parametrize("make", SENSED_LAWS.values(), ids=SENSED_LAWS)
 @pytest.mark.parametrize("factor", [0.9, 1.1])
 def test_a_load_pin_that_is_off_by_a_tenth_is_borne(make, factor):
     scenarios = held_out_scenarios(ScenarioDistribution(), 12)
