@@ -73,7 +73,10 @@ def test_a_period_of_ones_own_is_compared_at_it(tmp_path, monkeypatch, capsys):
     assert "control_period = 0.2" in (compared / "config.toml").read_text()
     with pytest.raises(SystemExit):
         command(monkeypatch, "train.evaluate.__main__", *options[:-1], tmp_path / "another")
-    assert "control_period = 0.1 s: residual PPO was trained at 0.2 s, as by --control-period 0.2" in capsys.readouterr().err
+    assert (
+        "control_period = 0.1 s: residual PPO was trained at 0.2 s, as by --control-period 0.2"
+        in capsys.readouterr().err
+    )
     assert not (tmp_path / "another").exists()
 
 

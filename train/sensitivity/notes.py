@@ -15,9 +15,9 @@ TEXT = """\
 Made by `{command}`.
 
 {scenarios} held-out random seas are assumed. Every policy that goes by the clock (the drives, and the drive map) is
-told its assumed scenario in full, waves and phases included, and then meets another one; laws and agents are told
-the rope's length and its stiffness, weigh the load, and measure the rest. Figures are RMS depth errors over that of the drum left still in the assumed
-scenario, so that what the scenario itself does is in them too: see the drum still.
+told its assumed scenario in full, waves and phases included, and then meets another one; laws and agents are told the
+rope's length and its stiffness, weigh the load, and measure the rest. Figures are RMS depth errors over that of the
+drum left still in the assumed scenario, so that what the scenario itself does is in them too: see the drum still.
 
 ## As assumed, at both ends of each range, and over all ranges at once
 Median over the assumed scenarios; the last columns are median, 95 % quantile and worst case when all factors vary

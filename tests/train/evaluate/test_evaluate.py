@@ -25,7 +25,11 @@ def test_the_committed_agent_is_as_good_as_the_results_say(model, drives, tmp_pa
     assert rows["residual PPO"]["reduction"]["value"] > rows["output zero"]["reduction"]["value"] + 0.001
     assert rows["residual PPO"]["worse_than_still"] == 0
     assert {*drives, "drive map by the clock"} <= set(rows)
-    assert all(row["knows"] == "clock" for name, row in rows.items() if name not in ("residual PPO", "output zero", "drum still"))
+    assert all(
+        row["knows"] == "clock"
+        for name, row in rows.items()
+        if name not in ("residual PPO", "output zero", "drum still")
+    )
     assert json.loads((out / "run.json").read_text())["command"].startswith("python -m train.evaluate --policies")
 
 
