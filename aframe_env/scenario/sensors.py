@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -78,7 +79,8 @@ class Sensors:
     @classmethod
     def ideal(cls) -> Sensors:
         """Return the same channels without noise, delay, sampling or resolution."""
-        return cls(delay=0.0, **{name: Channel() for name in CHANNELS})
+        perfect: dict[str, Any] = {name: Channel() for name in CHANNELS}
+        return cls(delay=0.0, **perfect)
 
 
 CHANNELS = ("heave", "heave_rate", "roll", "pitch", "drum_angle", "drum_speed", "tension", "depth_error")
