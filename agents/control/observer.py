@@ -29,8 +29,6 @@ class KalmanObserver:
         self._hoists = hoists
         self._damping_ratio = damping_ratio
         self.model = hoists.model(damping_ratio)
-        self.delay = hoists.period * round(sensors.delay / hoists.period)
-        """s, in whole control steps."""
         rows, hold = len(hoists.frequency), max(1, round(sensors.depth_error.period / hoists.period))
         self._turns = np.zeros((round(sensors.delay / hoists.period), rows))
         """(steps of delay, N) turns of the drums since the moment of measurement, rad."""
@@ -107,8 +105,6 @@ class KalmanObserver:
 class StateObserver:
     """What ``KalmanObserver`` tells, from observations of the full state: only the path to come is an estimate."""
 
-    delay = 0.0
-
     def __init__(self, hoists: HoistBatch, damping_ratio: float, waves: ExpectedWaves) -> None:
         self._hoists = hoists
         self._damping_ratio = damping_ratio
@@ -136,9 +132,8 @@ class StateObserver:
     def rises(self, steps: int) -> FloatArray:
         """Rise of the pulley during each of the coming control steps, (steps, N) m."""
         period = self._hoists.period
-        rises = np.diff(self.waves.path(period * np.arange(steps + 1.0)), axis=0)
-        rises[0] = period * (self._velocity + 0.5 * period * self._acceleration)
-        return rises
+        soon = period * (self._velocity + 0.5 * period * self._acceleration)
+        return np.concatenate([soon[None], np.diff(self.waves.path(period * np.arange(1.0, steps + 1.0)), axis=0)])
 
     def pulley(self) -> tuple[FloatArray, ...]:
         """Velocity [m/s] and acceleration [m/s²] (N,) of the pulley."""

@@ -117,7 +117,3 @@ class HoistBatch:
     def stretch_under(self, force: FloatArray, o: Columns, rows: Rows = ALL) -> FloatArray:
         """Stretch (N,) m of the rope by a force (N,) N."""
         return np.asarray(force * o["rope_length"] / self._axial_stiffness[rows])
-
-    def load_acceleration(self, o: Columns, rows: Rows = ALL) -> FloatArray:
-        """Vertical acceleration (N,) m/s² of the load, as the tension tells."""
-        return np.asarray((o["rope_tension"] / self._weight[rows] - 1.0) * GRAVITY)

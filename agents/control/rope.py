@@ -42,10 +42,6 @@ class RopeModel:
         """Put the rows of another model in the place of these."""
         self.a[rows], self.b[rows] = other.a, other.b
 
-    def row(self, index: int) -> RopeModel:
-        """Model of one row."""
-        return RopeModel(self.a[index : index + 1], self.b[index : index + 1])
-
     def advance(self, z: FloatArray, change: FloatArray) -> FloatArray:
         """State (N, 4) a control step after ``z`` (N, 4), p having changed by ``change`` (N,) m/s."""
         return np.asarray((self.a @ z[:, :, None])[:, :, 0] + self.b * change[:, None])
