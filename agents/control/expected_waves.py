@@ -11,15 +11,18 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 
 from aframe_env.scenario import Scenario, ScenarioSource
-from aframe_env.scenario.motion import Coordinate, has_components, is_tabled
+from aframe_env.scenario.crane import Crane
+from aframe_env.scenario.motion import ComplexArray, Coordinate, has_components, is_tabled
 from aframe_env.scenario.sea import SeaMotion
 from aframe_env.validation import InvalidValue, require_number
 from agents.control.filters import FloatArray
+
+FloatOrComplex = TypeVar("FloatOrComplex", FloatArray, ComplexArray)
 
 SEED: Final = 3_000_017
 """Seed of the scenarios that the spectrum is the mean of."""
@@ -102,24 +105,27 @@ def _another(scenario: Scenario, seed: int) -> Scenario:
     return replace(scenario, motion=replace(scenario.motion, sea=replace(scenario.motion.sea, seed=seed)))
 
 
+def pulley_heave(coordinates: FloatOrComplex, crane: Crane) -> FloatOrComplex:
+    """Linear heave (K,) of the crane's pulley, or its rate, for the deck's coordinates or rates (K, 6)."""
+    x, y, _ = crane.pulley_position
+    return coordinates[:, Coordinate.HEAVE] + y * coordinates[:, Coordinate.ROLL] - x * coordinates[:, Coordinate.PITCH]
+
+
 def _spectra(scenarios: Iterable[Scenario]) -> Iterable[tuple[FloatArray, FloatArray]]:
     """Frequencies (K,) rad/s and variances (K,) m²/s² of the pulley's heave rate in each scenario."""
     for scenario in scenarios:
-        x, y, _ = scenario.crane.pulley_position
         motion = scenario.motion
         if has_components(motion):
             components = motion.components()
-            q = components.response
-            heave = q[:, Coordinate.HEAVE] + y * q[:, Coordinate.ROLL] - x * q[:, Coordinate.PITCH]
+            heave = pulley_heave(components.response, scenario.crane)
             yield components.frequency, 0.5 * np.square(np.abs(heave) * components.frequency)
         else:
             assert is_tabled(motion)
-            yield _recorded(motion.table(_SAMPLING)[:, 6:12], x, y)
+            yield _spectrum(pulley_heave(motion.table(_SAMPLING)[:, 6:12], scenario.crane))
 
 
-def _recorded(rates: FloatArray, x: float, y: float) -> tuple[FloatArray, FloatArray]:
-    """Spectrum of a record: of the pulley's heave rate, from the deck's ``rates`` (T, 6)."""
-    signal = rates[:, Coordinate.HEAVE] + y * rates[:, Coordinate.ROLL] - x * rates[:, Coordinate.PITCH]
+def _spectrum(signal: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Spectrum of a record (T,) of the pulley's heave rate."""
     window = np.hanning(len(signal))
     spectrum = np.fft.rfft(window * (signal - signal.mean()))
     power = 2.0 * np.square(np.abs(spectrum)) / (len(signal) * np.square(window).sum())

@@ -16,6 +16,7 @@ from scipy.optimize import least_squares
 from aframe_env.scenario import Scenario
 from aframe_env.scenario.motion import Components, Coordinate, has_components
 from aframe_env.validation import InvalidValue, require_integer, require_number
+from agents.control.expected_waves import pulley_heave
 from agents.policy import FloatArray
 
 SAMPLING: Final = 0.5
@@ -60,11 +61,9 @@ def tip_heave(scenario: Scenario, times: FloatArray) -> FloatArray:
 
 def known_harmonics(scenario: Scenario) -> Harmonics:
     """Tip heave of every component of the ship's motion, linear in the deck's angles: the whole future."""
-    x, y, _ = scenario.crane.pulley_position
     components = _components(scenario)
-    q = components.response
     # Re(c exp(iωt)) = |c| sin(ωt + arg c + π/2)
-    heave = q[:, Coordinate.HEAVE] + y * q[:, Coordinate.ROLL] - x * q[:, Coordinate.PITCH]
+    heave = pulley_heave(components.response, scenario.crane)
     return Harmonics(np.abs(heave), components.frequency, np.angle(heave) + 0.5 * math.pi)
 
 
