@@ -28,7 +28,25 @@ Face = TypeVar("Face", AFrameHeaveEnv, AFrameHeaveVectorEnv)
 _ACTION = spaces.Box(-1.0, 1.0, (1,), np.float32)
 
 
-class AgentInterface(gymnasium.Wrapper[Float32Array, Float32Array, Float32Array, Float32Array], RecordConstructorArgs):
+class _Named:
+    """What both wrappers tell of their features."""
+
+    _features: LearnerFeatures
+
+    @property
+    def feature_names(self) -> tuple[str, ...]:
+        """Names of the features, in the order of an observation."""
+        return self._features.names
+
+    @property
+    def actor_inputs(self) -> int:
+        """Number of features that are the agent's, the first ones; the rest is for critics alone."""
+        return self._features.actor_inputs
+
+
+class AgentInterface(
+    _Named, gymnasium.Wrapper[Float32Array, Float32Array, Float32Array, Float32Array], RecordConstructorArgs
+):
     """``AFrameHeave-v0`` as the agents see it: their features, their action, the reward that they are trained with.
 
     - Observation: ``Box(-20, 20, (F,), float32)``, the features ``feature_names`` of the environment's observation.
@@ -47,16 +65,6 @@ class AgentInterface(gymnasium.Wrapper[Float32Array, Float32Array, Float32Array,
         self._cuts = Cuts(1, simulation.control_period, simulation.episode_duration, self._config)
         self.observation_space = _observation_space(self._features)  # type: ignore[assignment]
         self.action_space = _ACTION
-
-    @property
-    def feature_names(self) -> tuple[str, ...]:
-        """Names of the features, in the observation's order."""
-        return self._features.names
-
-    @property
-    def actor_inputs(self) -> int:
-        """Number of features that are the agent's, the first ones; the rest is for critics alone."""
-        return self._features.actor_inputs
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -78,7 +86,7 @@ class AgentInterface(gymnasium.Wrapper[Float32Array, Float32Array, Float32Array,
         return self._features.values[0].copy(), shaped, terminated, truncated or (cut and not terminated), info
 
 
-class AgentVectorInterface(VectorWrapper):
+class AgentVectorInterface(_Named, VectorWrapper):
     """``AgentInterface`` for the native vector environment, in each of its autoreset modes.
 
     Row k is bit-equal to an ``AgentInterface`` on the scalar environment that is seeded as that row is. In SAME_STEP
@@ -112,16 +120,6 @@ class AgentVectorInterface(VectorWrapper):
         self.single_action_space = _ACTION
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-
-    @property
-    def feature_names(self) -> tuple[str, ...]:
-        """Names of the features, in the observations' order."""
-        return self._features.names
-
-    @property
-    def actor_inputs(self) -> int:
-        """Number of features that are the agent's, the first ones; the rest is for critics alone."""
-        return self._features.actor_inputs
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Float32Array, dict[str, Any]]:
         """Start episodes in all rows, or in those of ``options["reset_mask"]``; arguments as the environment's."""
