@@ -6,9 +6,14 @@ first used, so that the import itself is quick.
 
 from __future__ import annotations
 
+import warnings
+
 import gymnasium
 import lazy_loader
 
+from aframe_env.neighbours import in_the_way, overwritten
+
+__version__ = "0.1.0"
 ENV_ID = "AFrameHeave-v0"
 
 if ENV_ID not in gymnasium.registry:
@@ -18,6 +23,10 @@ if ENV_ID not in gymnasium.registry:
         entry_point="aframe_env.env:AFrameHeaveEnv",
         vector_entry_point="aframe_env.vector_env:AFrameHeaveVectorEnv",
     )
+
+# A folder of the user's may well be called so, and this package does without it. One that is damaged is worth a word.
+if overwritten("agents"):
+    warnings.warn(f"{in_the_way('agents')}", stacklevel=2)
 
 __getattr__, _, __all__ = lazy_loader.attach_stub(__name__, __file__)
 __all__ += ["ENV_ID"]

@@ -11,6 +11,7 @@ from .scenario.vessel import Vessel
 from .validation import InvalidValue, SmallRotationWarning
 
 ENV_ID: str
+__version__: str
 
 __all__ = [
     "ENV_ID",

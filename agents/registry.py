@@ -20,6 +20,7 @@ import numpy.typing as npt
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario, Sensors
 from aframe_env.validation import InvalidValue
+from agents import shipped
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.feedback import Feedback
 from agents.control.inverse_dynamics import InverseDynamics
@@ -192,18 +193,19 @@ def slug(name: str) -> str:
 def choose(text: str) -> PolicySpec:
     """Return the policy of that name in the registry (or the name's slug), folder, or ``module:function``.
 
-    The folder of a drive map is the map in real time, on the sensors; with ``:state`` behind it that on the full state,
-    with ``:clock`` the map by the clock, as in ``results/drive-map:clock``.
+    What is shipped goes by its name instead of its folder ("ppo-sensors", "drive-map"). A drive map is the map in real
+    time, on the sensors; with ``:state`` behind it that on the full state, with ``:clock`` the map by the clock.
     """
     by_slug = {slug(name): spec for name, spec in REGISTRY.items()}
     if slug(text) in by_slug:
         return by_slug[slug(text)]
-    if Path(text).is_dir():
-        return _from_folder(Path(text))
-    folder, colon, word = text.rpartition(":")
-    kinds = _kinds_in(Path(folder)) if colon else {}
+    if shipped.folder(text).is_dir():
+        return _from_folder(shipped.folder(text))
+    before, colon, word = text.rpartition(":")
+    folder = shipped.folder(before)
+    kinds = _kinds_in(folder) if colon else {}
     if word in kinds:
-        return kinds[word](Path(folder))
+        return kinds[word](folder)
     if kinds:
         known = " or ".join(repr(f":{each}") for each in kinds if each) or "nothing"
         raise InvalidValue(f"policy = {text!r}: behind this folder may stand {known}")
@@ -211,7 +213,7 @@ def choose(text: str) -> PolicySpec:
     if colon and module.replace(".", "").isidentifier() and attribute.isidentifier():
         return _from_module(text, module, attribute)
     raise InvalidValue(
-        f"policy = {text!r}: must be one of {', '.join(repr(name) for name in REGISTRY)}, "
+        f"policy = {text!r}: must be one of {', '.join(map(repr, [*REGISTRY, *shipped.AGENTS, shipped.DRIVE_MAP]))}, "
         "the folder of an agent or a drive map, or module:function"
     )
 
@@ -233,7 +235,7 @@ def choose_all(texts: Sequence[str]) -> list[PolicySpec]:
 
 
 def _expanded(text: str) -> list[str]:
-    return [str(path) for path in learned.seeds(text)] or [text]
+    return [str(path) for path in learned.seeds(shipped.folder(text))] or [text]
 
 
 def as_spec(policy: Policy) -> PolicySpec:

@@ -7,7 +7,13 @@ from __future__ import annotations
 
 import sys
 
-from train.learn.run import main
+from train.learn import run
+
+
+def main() -> int:
+    """Run the command."""
+    return run.main("ppo-rsl")
+
 
 if __name__ == "__main__":
-    sys.exit(main("ppo-rsl"))
+    sys.exit(main())

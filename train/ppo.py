@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import sys
 
-from train.learn.run import main
+from train.learn import run
+
+
+def main() -> int:
+    """Run the command."""
+    return run.main("ppo")
+
 
 if __name__ == "__main__":
-    sys.exit(main("ppo"))
+    sys.exit(main())

@@ -26,6 +26,7 @@ from aframe_env.scenario import Crane, Scenario
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion
 from aframe_env.serialization import strict_converter, structure
 from aframe_env.validation import InvalidValue, require_number
+from agents import shipped
 from agents.drives.forecast import Harmonics
 from agents.drives.functions import RampedDrive
 from agents.drives.objectives import Objective, coarse_step
@@ -205,9 +206,9 @@ def serialise(drive_map: DriveMap, command: str, versions: dict[str, str]) -> tu
     return data, json.dumps(asdict(card), indent=2, ensure_ascii=False) + "\n"
 
 
-def load(folder: str | Path) -> DriveMap:
-    """Load a map from its folder. Raises InvalidValue where the files do not belong together."""
-    path = Path(folder)
+def load(place: str | Path = shipped.DRIVE_MAP) -> DriveMap:
+    """Load a map from its folder, or the shipped one. Raises InvalidValue where the files do not belong together."""
+    path = shipped.folder(place)
     try:
         text, data = (path / CARD).read_text(encoding="utf-8"), (path / ARRAYS).read_bytes()
     except OSError as error:

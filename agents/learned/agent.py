@@ -17,6 +17,7 @@ from safetensors.torch import save as save_tensors
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.serialization import strict_converter, structure
 from aframe_env.validation import InvalidValue
+from agents import shipped
 from agents.control.expected_waves import ExpectedWaves
 from agents.learned.feature_policy import OnFeatures
 from agents.learned.features import Action, FeatureConfig, feature_names
@@ -113,12 +114,16 @@ def seeds(folder: str | Path) -> list[Path]:
     return [numbered[seed] for seed in sorted(numbered)]
 
 
-def load(folder: str | Path) -> LearnedPolicy:
-    """Load an agent from its folder; that of the lowest seed where there are several.
+def load(agent: str | Path) -> LearnedPolicy:
+    """Load a shipped agent by its name, as "ppo-sensors", or one from its folder.
 
-    Raises InvalidValue where there is none or its files do not belong together.
+    The lowest seed where there are several. Raises InvalidValue where there is none, or files that do not belong
+    together.
     """
-    path = Path(folder)
+    path = shipped.folder(agent)
+    if not path.is_dir():
+        names = ", ".join(map(repr, shipped.AGENTS))
+        raise InvalidValue(f"agent = {str(agent)!r}: must be one of {names}, or the folder of an agent")
     if not (path / CARD).is_file() and seeds(path):
         path = seeds(path)[0]
     try:

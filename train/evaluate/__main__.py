@@ -1,9 +1,9 @@
-"""Compare policies on the same held-out scenarios: ``python -m train.evaluate --policies results/agents/ppo S-Ω1``.
+"""Compare policies on the same held-out scenarios: ``python -m train.evaluate --policies ppo S-Ω1``.
 
-A policy is a name ("S-Ω1", or s-omega1 on a keyboard without Ω), the folder of an agent or a drive map, or
-module:function for your own: see ``agents.registry``. The drum left alone is always there as the yardstick. Writes the
-table (Markdown, JSON, PNG), every episode (CSV, Parquet), and report.html: one page with figures, pictures and the
-worst cases, which opens in any browser, offline.
+A policy is a name ("S-Ω1", or s-omega1 on a keyboard without Ω; "ppo-sensors" and "drive-map" are shipped), the folder
+of an agent or a drive map, or module:function for your own: see ``agents.registry``. The drum left alone is always
+there as the yardstick. Writes the table (Markdown, JSON, PNG), every episode (CSV, Parquet), and report.html: one page
+with figures, pictures and the worst cases, which opens in any browser, offline.
 """
 
 from __future__ import annotations
@@ -23,17 +23,23 @@ from train.shared.run_folder import RunOptions, open_run, user_errors
 REPORT_PACKAGES = ("jinja2", "plotly", "pyarrow")
 
 
+def needed_for_the_report() -> str:
+    """What the report still needs, and the command that helps; empty where it needs nothing."""
+    missing = [name for name in REPORT_PACKAGES if find_spec(name) is None]
+    return f"needs {', '.join(missing)}; pip install 'aframe-heave[report]'" if missing else ""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Options(RunOptions, HeldOut):
     """Policies, and the held-out scenarios that they meet."""
 
     policies: tuple[str, ...] = (
-        "results/agents/ppo",
-        "results/agents/sac",
-        "results/agents/ppo-sensors",
-        "results/agents/sac-sensors",
-        "results/drive-map",
-        "results/drive-map:clock",
+        "ppo",
+        "sac",
+        "ppo-sensors",
+        "sac-sensors",
+        "drive-map",
+        "drive-map:clock",
         *AFTER_TRAINING,
         "output zero",
         "output zero on sensors",
@@ -41,17 +47,15 @@ class Options(RunOptions, HeldOut):
         "predictive control",
         "inverse dynamics",
     )
-    """Names, folders of agents (of all seeds, where there are several) or of drive maps, or module:function."""
-    report: bool = True
-    """Write report.html and episodes.parquet too (extra "report")."""
+    """Names, or folders of agents (of all seeds, where there are several) or of drive maps, or module:function."""
+    report: bool = not needed_for_the_report()
+    """Write report.html and episodes.parquet too; by default where the extra "report" is installed."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        missing = [name for name in REPORT_PACKAGES if find_spec(name) is None]
-        if self.report and missing:
-            raise InvalidValue(
-                f"report = True: needs {', '.join(missing)}; pip install 'aframe-heave[report]', or pass --no-report"
-            )
+        needed = needed_for_the_report()
+        if self.report and needed:
+            raise InvalidValue(f"report = True: {needed}, or pass --no-report")
 
 
 def main() -> int:
@@ -76,6 +80,8 @@ def main() -> int:
                 with console.status("writing the report"):
                     write_report(folder / "report.html", comparison, opened.command)
                 console.print(f"report: {folder / 'report.html'}")
+            elif needed := needed_for_the_report():
+                console.print(f"no report: it {needed}", markup=False)
         except KeyboardInterrupt:
             console.print("interrupted: the comparison is not complete")
             return 130

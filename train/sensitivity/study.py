@@ -12,6 +12,7 @@ import numpy as np
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_choice, require_integer
+from agents import shipped
 from agents.drives import map as drive_map
 from agents.drives.map_policy import DriveMapPolicy
 from agents.drives.optimisation import OPTIMISERS, OptimisedDrive, Optimiser
@@ -36,12 +37,12 @@ class Options(RunOptions, ScenarioOptions):
         *TUNED,
         MAP,
         "feed-forward + feedback",
-        "results/agents/ppo",
-        "results/agents/sac",
-        "results/agents/ppo-sensors",
-        "results/agents/sac-sensors",
+        "ppo",
+        "sac",
+        "ppo-sensors",
+        "sac-sensors",
     )
-    """"drum still", "S-Ω1", "S-Ω2", "H-Ω1", "H-Ω2", "drive map", or the folder of an agent."""
+    """"drum still", "S-Ω1", "S-Ω2", "H-Ω1", "H-Ω2", "drive map", or an agent by its name or folder."""
     bounds: ClassVar[tuple[int, int]] = (1, 10_000)
     scenarios: int | Path = 8
     """Number of held-out scenarios that are assumed; or a TOML file with a scenario or a distribution of your own."""
@@ -49,8 +50,8 @@ class Options(RunOptions, ScenarioOptions):
     """Values of each factor, one at a time."""
     samples: int = 128
     """Base samples of the Sobol indices, a power of two: 8 times as many combinations, in every assumed scenario."""
-    drive_map: Path = Path("results/drive-map")
-    """Folder of the drive map."""
+    drive_map: str = shipped.DRIVE_MAP
+    """The drive map: the shipped one by its name, or the folder of one."""
     optimiser: Optimiser = "nelder-mead"
     """Optimiser of the drives for Ω1."""
     seed: int = 0

@@ -37,6 +37,11 @@ def _converter() -> Converter:
     return converter
 
 
+def program(command: str) -> str:
+    """How the running command was called: "aframe drives", or "python -m train.drives" for "train.drives"."""
+    return sys.argv[0] if sys.argv[0].startswith("aframe ") else f"python -m {command}"
+
+
 def parse(kind: type[T], command: str, description: str, args: Sequence[str] | None = None) -> T:
     """Options from the command line; ``--config FILE.toml`` gives the defaults that the rest overrides.
 
@@ -53,7 +58,7 @@ def parse(kind: type[T], command: str, description: str, args: Sequence[str] | N
             del args[index : index + (1 if value else 2)]
             break
     epilog = description + "\n\n--config FILE.toml reads the options from a file; the rest overrides it."
-    prog = f"python -m {command}"
+    prog = program(command)
     return (
         tyro.cli(kind, prog=prog, args=args, description=epilog, default=default)
         if default

@@ -20,7 +20,7 @@ from gymnasium.error import DependencyNotInstalled
 from llvmlite.binding import get_host_cpu_name
 
 from aframe_env.validation import InvalidValue
-from train.shared.cli import to_toml
+from train.shared.cli import program, to_toml
 
 REPORTED_PACKAGES = ("gymnasium", "stable-baselines3", "torch", "numpy", "scipy", "numba", "waveresponse")
 
@@ -81,7 +81,7 @@ def versions() -> dict[str, str]:
 
 def command_line(name: str) -> str:
     """Return the command line that is running; ``name`` is the command's, as in "train.drives"."""
-    return shlex.join(["python", "-m", name, *sys.argv[1:]])
+    return " ".join([program(name), *map(shlex.quote, sys.argv[1:])])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,7 +109,7 @@ class Run:
 
 
 def open_run(options: RunOptions, name: str) -> Run:
-    """Make the folder of a run of ``python -m NAME``."""
+    """Make the folder of a run of the command of that name."""
     default = Path("runs") / f"{name.rpartition('.')[2].replace('_', '-')}-{datetime.now():%Y%m%d-%H%M%S}"
     return Run(new_folder(options.out or default, overwrite=options.overwrite), command_line(name))
 

@@ -1,0 +1,21 @@
+"""The agents and the drive map that come with the package, by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+_IN_A_WHEEL: Final = Path(__file__).parent / "data"
+_IN_A_CHECKOUT: Final = Path(__file__).parents[1] / "results"
+_ROOT: Final = _IN_A_WHEEL if _IN_A_WHEEL.is_dir() else _IN_A_CHECKOUT
+
+AGENTS: Final[dict[str, Path]] = {folder.name: folder for folder in sorted(_ROOT.glob("agents/*/"))}
+"""Folders of the agents. A wheel has one seed of each, a checkout all."""
+DRIVE_MAP: Final = "drive-map"
+
+
+def folder(place: str | Path) -> Path:
+    """Return the folder of what is shipped under a name, or else that path; "./ppo" is always a path."""
+    if place == DRIVE_MAP:
+        return _ROOT / DRIVE_MAP
+    return AGENTS.get(str(place), Path(place)) if isinstance(place, str) else place
