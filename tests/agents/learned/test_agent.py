@@ -91,8 +91,10 @@ def test_damaged_weights_are_refused(tmp_path):
 
 
 def test_no_agent_and_no_json(tmp_path):
-    with pytest.raises(InvalidValue, match="no agent in"):
+    with pytest.raises(InvalidValue, match=r"must be one of 'ppo', .*, or the folder of an agent"):
         load(tmp_path / "absent")
+    with pytest.raises(InvalidValue, match="no agent in"):
+        load(tmp_path)
     (tmp_path / WEIGHTS).write_bytes(b"")
     (tmp_path / CARD).write_text("{")
     with pytest.raises(InvalidValue, match="not JSON"):

@@ -33,13 +33,26 @@ def test_the_committed_agent_is_as_good_as_the_results_say(model, drives, tmp_pa
     assert json.loads((out / "run.json").read_text())["command"].startswith("python -m train.evaluate --policies")
 
 
+def test_without_its_extra_the_report_is_left_out_and_said(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(evaluate, "REPORT_PACKAGES", ("jinja2", "absent_package"))
+    out = tmp_path / "out"
+    command(monkeypatch, "--policies", "drum still", "--scenarios", 2, "--no-report", "--out", out)
+    assert "needs absent_package; pip install 'aframe-heave[report]'" in " ".join(capsys.readouterr().out.split())
+    assert (out / "comparison.md").is_file()
+    with pytest.raises(SystemExit):
+        command(monkeypatch, "--policies", "drum still", "--scenarios", 2, "--report", "--out", tmp_path / "none")
+    assert not (tmp_path / "none").exists()
+
+
 def test_the_report_is_written_beside_the_episodes(tmp_path, monkeypatch):
     out = tmp_path / "out"
-    assert (
-        command(monkeypatch, "--policies", "inverse dynamics", "--scenarios", 2, "--privileged", 0, "--out", out) == 0
-    )
+    # More privileged ones than there are: all of them.
+    few = ("--scenarios", 2, "--privileged", 50, "--out", out)
+    assert command(monkeypatch, "--policies", "inverse dynamics", "S-Ω1 for each scenario", *few) == 0
+    rows = {row["policy"]: row for row in json.loads((out / "comparison.json").read_text(encoding="utf-8"))["policies"]}
+    assert rows["S-Ω1 for each scenario"]["scenarios"] == 2
     assert (out / "episodes.parquet").is_file()
-    assert "--policies &#39;inverse dynamics&#39; --scenarios 2" in (out / "report.html").read_text(encoding="utf-8")
+    assert "--policies &#39;inverse dynamics&#39; " in (out / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
