@@ -29,6 +29,8 @@ def in_the_way(name: str) -> str | None:
             f"{found}, of {' and '.join(owners)}, stands in the way of aframe-heave's own package {name!r}: "
             "install the two into environments of their own (python -m venv)"
         )
+    if _own(name).parent in (found, found.parent):
+        return f"{found}: aframe-heave's own package {name!r} is damaged: pip install --force-reinstall aframe-heave"
     return (
         f"{found} stands in the way of aframe-heave's own package {name!r}: rename it, or run from another folder "
         "(and without its folder in PYTHONPATH)"

@@ -216,6 +216,12 @@ def test_a_distribution_that_overwrites_agents_is_named(tmp_path: Path) -> None:
     said = python("-c", "import aframe_env; import agents", path=site, cwd=folder)
     assert said.returncode == 0
     assert f"UserWarning: {sentence}" in said.stderr
+    # As an uninstaller of the other distribution leaves it.
+    shutil.rmtree(info)
+    (site / "agents" / "__init__.py").unlink()
+    said = python(*AFRAME, "ppo", path=site, cwd=folder)
+    damaged = f"error: {site / 'agents'}: aframe-heave's own package 'agents' is damaged: pip install --force-reinstall"
+    assert (said.returncode, said.stderr) == (2, f"{damaged} aframe-heave\n")
 
 
 def test_the_citation_is_of_this_version() -> None:
