@@ -25,7 +25,7 @@ from agents.control.expected_waves import ExpectedWaves
 from agents.control.feedback import Feedback
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.optimum import CommandSequence, optimise
-from agents.control.predictive import PredictiveControl
+from agents.control.predictive import PlanningConfig, PredictiveControl
 from agents.drives import map as drive_map
 from agents.drives.map_policy import DriveMapPolicy
 from agents.drives.optimisation import Optimiser
@@ -142,8 +142,8 @@ REGISTRY: Final[dict[str, PolicySpec]] = {
         *(_nominal_drive(name, how) for name, how in TUNED.items()),
         _law(lambda sensors, waves: Feedback(None, waves=waves)),
         _law(lambda sensors, waves: Feedback(sensors, waves=waves)),
-        _law(lambda sensors, waves: PredictiveControl(sensors=None, waves=waves)),
-        _law(lambda sensors, waves: PredictiveControl(sensors=sensors, waves=waves)),
+        _law(lambda sensors, waves: PredictiveControl(PlanningConfig(sensors=None, waves=waves))),
+        _law(lambda sensors, waves: PredictiveControl(PlanningConfig(sensors=sensors, waves=waves))),
         _law(lambda sensors, waves: InverseDynamics()),
         _output_zero("state", "output zero"),
         _output_zero("sensors", "output zero on sensors"),

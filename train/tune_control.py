@@ -29,7 +29,7 @@ from agents.control.feedback import SENSOR_GAINS, STATE_GAINS, Feedback
 from agents.control.inverse_dynamics import GAINS as INVERSE_GAINS
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.optimum import optimise
-from agents.control.predictive import SENSOR_EFFORT, STATE_EFFORT, PredictiveControl
+from agents.control.predictive import SENSOR_EFFORT, STATE_EFFORT, PlanningConfig, PredictiveControl
 from agents.control.regulator import Gains
 from agents.policy import DrumStill, FloatArray, Policy
 from agents.rollout import HELD_OUT_SEED, drawn_scenarios, run
@@ -55,13 +55,15 @@ TUNABLE: dict[Name, Tunable] = {
     "state": Tunable(lambda gains, sensors, waves: Feedback(None, gains, waves), "state", STATE_GAINS),
     "sensors": Tunable(lambda gains, sensors, waves: Feedback(sensors, gains, waves), "sensors", SENSOR_GAINS),
     "predictive-state": Tunable(
-        lambda gains, sensors, waves: PredictiveControl(None, gains.effort, waves=waves),
+        lambda gains, sensors, waves: PredictiveControl(PlanningConfig(sensors=None, effort=gains.effort, waves=waves)),
         "state",
         Gains(effort=STATE_EFFORT, share=1.0),
         has_share=False,
     ),
     "predictive-sensors": Tunable(
-        lambda gains, sensors, waves: PredictiveControl(sensors, gains.effort, waves=waves),
+        lambda gains, sensors, waves: PredictiveControl(
+            PlanningConfig(sensors=sensors, effort=gains.effort, waves=waves)
+        ),
         "sensors",
         Gains(effort=SENSOR_EFFORT, share=1.0),
         has_share=False,

@@ -13,14 +13,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aframe_env.scenario import Scenario, ScenarioDistribution
+from aframe_env.scenario.crane import Crane
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import require_integer, require_number
 from agents.control.expected_waves import ExpectedWaves
+from agents.control.filters import ALL, Rows
 from agents.control.interior_point import BoundedTracking
-from agents.control.observer import Observer, observer_for
-from agents.control.regulator import HoistBatch, Observation
-from agents.control.rope import RopeModel
+from agents.control.observer import observer_for
+from agents.control.regulator import Columns, HoistBatch, Observation
 from agents.policy import FloatArray, Knowledge
 
 STATE_EFFORT = 0.0094
@@ -29,107 +30,198 @@ SENSOR_EFFORT = 0.017
 """Tuned with ``python -m train.tune_control``, s²."""
 
 
-@dataclass
-class PredictiveControl:
-    """Model-predictive control; the agents' Kalman filters predict the motion."""
+@dataclass(frozen=True, kw_only=True)
+class PlanningConfig:
+    """What predictive control is designed for."""
 
     sensors: Sensors | None = field(default_factory=Sensors)
-    """Delay and noise that the law is designed for; None for the full state, which has neither."""
+    """Delay and noise; None for the full state, which has neither."""
     effort: float | None = None
     """Weight on changes of the rope end's speed, s²; None for the one that was tuned."""
     horizon: int = 50
     """Control steps."""
     damping_ratio: float = 0.03
-    """Damping of the load's bobbing on the rope that the law is designed for, share of critical."""
+    """Damping of the load's bobbing on the rope, share of critical."""
     waves: ExpectedWaves = field(default_factory=lambda: ExpectedWaves.of(ScenarioDistribution()))
-    """Motion that it is designed for."""
-    name: str = field(init=False)
-    knows: Knowledge = field(init=False)
-    _price: float = field(init=False, repr=False)
-    _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
-    _period: float = field(init=False, repr=False, default=0.1)
-    _hoists: HoistBatch | None = field(init=False, repr=False, default=None)
-    _model: RopeModel = field(init=False, repr=False)
-    _k: FloatArray = field(init=False, repr=False)
-    _cost_to_go: FloatArray = field(init=False, repr=False)
-    _observer: Observer = field(init=False, repr=False)
-    _turned: FloatArray = field(init=False, repr=False)
+    """Motion of the pulley."""
 
     def __post_init__(self) -> None:
-        self.knows = Knowledge.STATE if self.sensors is None else Knowledge.SENSORS
-        self.name = "predictive control (state)" if self.sensors is None else "predictive control"
-        self._price = self.effort or (STATE_EFFORT if self.sensors is None else SENSOR_EFFORT)
-        require_number("effort", self._price, "s²", low=1e-8, high=1e8)
+        require_number("effort", self.price, "s²", low=1e-8, high=1e8)
         require_integer("horizon", self.horizon, low=2, high=1000)
         require_number("damping_ratio", self.damping_ratio, "of critical", low=0.0, high=1.0)
 
-    def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
-        """Begin N episodes; of the scenarios only the crane is looked at."""
-        self._scenarios, self._period, self._hoists = scenarios, control_period, None
+    @property
+    def price(self) -> float:
+        """The effort, or the one that was tuned, s²."""
+        if self.effort is not None:
+            return self.effort
+        return STATE_EFFORT if self.sensors is None else SENSOR_EFFORT
 
-    def act(self, observation: Observation, time: float) -> FloatArray:
-        """Drum speed commands (N,) rad/s for readings (N, 10), or observations (N, 14) of the full state."""
-        if self._hoists is None:
-            quantities = STATE if self.sensors is None else SENSED
-            hoists = self._hoists = HoistBatch(len(observation), self._period, quantities)
-            o = hoists.start([s.crane for s in self._scenarios], observation)
-            self._observer = observer_for(hoists, self.damping_ratio, self.sensors, self.waves)
-            self._observer.start(o)
-            self._model = self._observer.model
-            self._k = self._model.gains(self._price)
-            self._cost_to_go = self._model.costs_to_go(self._price)
-        else:
-            hoists = self._hoists
-            self._observer.advance(self._turned, hoists.columns(observation))
-        z, pulley = self._observer.state(), self._observer.rises(self.horizon).T / self._period
-        change = self.first_change(z, pulley, hoists.winch.speed)
-        speed = pulley[:, 0] - z[:, 3] - change
-        command, self._turned = hoists.winch.command(self._period * speed / hoists.winch.radius)
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What is planned for N hoists over the H control steps to come."""
+
+    state: FloatArray
+    """(N, 4) z of ``RopeModel``, now."""
+    pulley: FloatArray
+    """(N, H) mean speeds of the pulley, m/s."""
+    regulated: FloatArray
+    """(N, H) changes of the rope end's speed that the regulator would make, the winch's limits apart, m/s."""
+    change: FloatArray
+    """(N, H) changes that are planned, m/s."""
+    depth_error: FloatArray
+    """(N, H) depth errors that these lead to, at the steps' ends, m."""
+    acceleration_demand: FloatArray
+    """(N, H) what the regulator would ask of the drum, as a share of what the winch can gain of speed in a step."""
+    speed_demand: FloatArray
+    """(N, H) likewise, of the winch's greatest speed."""
+
+    @property
+    def rope_speed(self) -> FloatArray:
+        """Mean speed (N,) m/s at which the drum is to pay out in the coming step."""
+        return np.asarray(self.pulley[:, 0] - self.state[:, 3] - self.change[:, 0])
+
+    @property
+    def regulated_rope_speed(self) -> FloatArray:
+        """The regulator's."""
+        return np.asarray(self.pulley[:, 0] - self.state[:, 3] - self.regulated[:, 0])
+
+
+class Planner:
+    """Predictive control of N hoists: what it knows of them, what it plans, and the commands that come of it."""
+
+    def __init__(self, rows: int, control_period: float, config: PlanningConfig) -> None:
+        self._config = config
+        self.period = control_period
+        self.hoists = HoistBatch(rows, control_period, STATE if config.sensors is None else SENSED)
+        self._observer = observer_for(self.hoists, config.damping_ratio, config.sensors, config.waves)
+        self._turned = np.zeros(rows)
+        self._k, self._cost_to_go = np.zeros((rows, 4)), np.zeros((rows, 4, 4))
+
+    def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Columns:
+        """Begin hoists in these rows with first observations (n, K); return these by their names."""
+        o = self.hoists.start(cranes, observation, rows)
+        self._observer.start(o, rows)
+        model, price = self.hoists.model(self._config.damping_ratio, rows), self._config.price
+        self._k[rows], self._cost_to_go[rows] = model.gains(price), model.costs_to_go(price)
+        return o
+
+    def advance(self, observation: Observation) -> Columns:
+        """Take the observations (N, K) of all rows, one control step later; return them by their names."""
+        o = self.hoists.columns(observation)
+        self._observer.advance(self._turned, o)
+        return o
+
+    def plan(self) -> Plan:
+        """The plan, as things stand."""
+        pulley = self._observer.rises(self._config.horizon).T / self.period
+        return self.plan_for(self._observer.state(), pulley, self.hoists.winch.speed)
+
+    def command(self, rope_speed: FloatArray) -> FloatArray:
+        """Drum speed commands (N,) rad/s by which the drums pay out at a mean ``rope_speed`` (N,) m/s."""
+        command, self._turned = self.hoists.winch.command(self.period * rope_speed / self.hoists.winch.radius)
         return command
 
-    def first_change(self, z: FloatArray, pulley: FloatArray, drum_speed: FloatArray) -> FloatArray:
-        """Change (N,) m/s of the rope end's speed, from states z (N, 4) and mean pulley speeds (N, H) m/s to come."""
-        problem = self.problem(z, pulley, drum_speed)
-        regulated = np.empty_like(pulley)
+    def plan_for(self, z: FloatArray, pulley: FloatArray, drum_speed: FloatArray) -> Plan:
+        """The plan for states z (N, 4), mean pulley speeds (N, H) m/s to come and drum speeds (N,) rad/s."""
+        model = self._observer.model
+        regulated, error = np.empty_like(pulley), np.empty_like(pulley)
         state = z
-        for k in range(self.horizon):
+        for k in range(pulley.shape[1]):
             regulated[:, k] = -(self._k * state).sum(axis=1)
-            state = self._model.advance(state, regulated[:, k])
-        inputs, speeds = problem.inputs + regulated, problem.state + np.cumsum(regulated, axis=1)
-        beyond = (abs(inputs) > problem.input_limit) | (abs(speeds) > problem.state_limit[:, None])
-        rows = np.flatnonzero(beyond.any(axis=1))
-        first = regulated[:, 0]
-        if len(rows):
-            first[rows] = problem.rows(rows).solve()[0][:, 0]
-        return first
+            state = model.advance(state, regulated[:, k])
+            error[:, k] = state[:, 0]
+        inputs, speed = self._nominal(z, pulley, drum_speed)
+        acceleration_demand = abs(inputs + regulated) / self._gain(pulley.shape[1])
+        winch = self.hoists.winch
+        speed_demand = abs(speed + np.cumsum(regulated, axis=1)) / (winch.radius * winch.max_speed)[:, None]
+        beyond = np.flatnonzero(((acceleration_demand > 1.0) | (speed_demand > 1.0)).any(axis=1))
+        change = regulated
+        if len(beyond):
+            change = regulated.copy()
+            change[beyond] = self.problem(z, pulley, drum_speed, beyond).solve()[0]
+            some, state = model.some(beyond), z[beyond]
+            for k in range(pulley.shape[1]):
+                state = some.advance(state, change[beyond, k])
+                error[beyond, k] = state[:, 0]
+        return Plan(
+            state=z,
+            pulley=pulley,
+            regulated=regulated,
+            change=change,
+            depth_error=error,
+            acceleration_demand=acceleration_demand,
+            speed_demand=speed_demand,
+        )
 
-    def problem(self, z: FloatArray, pulley: FloatArray, drum_speed: FloatArray) -> BoundedTracking:
-        """The problem of every row, in changes (N, H) m/s of the rope end's speed."""
-        assert self._hoists is not None
-        winch, (count, horizon) = self._hoists.winch, pulley.shape
+    def problem(self, z: FloatArray, pulley: FloatArray, drum_speed: FloatArray, rows: Rows = ALL) -> BoundedTracking:
+        """The problem of these rows, in changes (n, H) m/s of the rope end's speed; arguments of all rows."""
+        inputs, speed = self._nominal(z, pulley, drum_speed)
+        model, winch = self._observer.model.some(rows), self.hoists.winch
+        count, horizon = speed[rows].shape
         free = np.empty((horizon, count, 4))
-        state = z
+        state = z[rows]
         for k in range(horizon):
-            state = free[k] = self._model.advance(state, np.zeros(count))
-        # The drum's mean speed in a control step is the pulley's less the rope end's. From its speed now it can
-        # come by half of what it can gain in a whole step, and from step to step by all of it.
-        inputs = -np.diff(pulley, axis=1, prepend=0.0)
-        inputs[:, 0] += z[:, 3] + winch.radius * drum_speed
-        gain = np.repeat((self._period * winch.radius * winch.max_acceleration)[:, None], horizon, axis=1)
-        gain[:, 0] *= 0.5
+            state = free[k] = model.advance(state, np.zeros(count))
         return BoundedTracking(
-            a=self._model.a,
-            b=np.repeat(self._model.b[:, None], horizon, axis=1),
+            a=model.a,
+            b=np.repeat(model.b[:, None], horizon, axis=1),
             middle=np.zeros((count, 4)),
             middle_input=np.zeros((count, horizon)),
             error=np.ascontiguousarray(free[:, :, 0].T),
             error_middle=np.zeros((count, horizon)),
-            weights=(1.0, 0.0, self._price),
-            inputs=inputs,
-            state=z[:, 3:] - pulley,
-            input_limit=gain,
-            state_limit=winch.radius * winch.max_speed,
+            weights=(1.0, 0.0, self._config.price),
+            inputs=inputs[rows],
+            state=speed[rows],
+            input_limit=self._gain(horizon)[rows],
+            state_limit=(winch.radius * winch.max_speed)[rows],
             last_state=free[-1],
             # The error at the horizon's end is among those of the steps already.
-            cost_to_go=self._cost_to_go - np.diag([1.0, 0.0, 0.0, 0.0]),
+            cost_to_go=self._cost_to_go[rows] - np.diag([1.0, 0.0, 0.0, 0.0]),
         )
+
+    def _nominal(self, z: FloatArray, pulley: FloatArray, drum_speed: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Changes of the drum's speed and its speeds, both (N, H) m/s upwards, as long as the rope's end keeps its."""
+        # The drum's mean speed in a control step is the pulley's less the rope end's.
+        inputs = -np.diff(pulley, axis=1, prepend=0.0)
+        inputs[:, 0] += z[:, 3] + self.hoists.winch.radius * drum_speed
+        return inputs, z[:, 3:] - pulley
+
+    def _gain(self, horizon: int) -> FloatArray:
+        """Speed (N, H) m/s that the drums can gain.
+
+        From its speed now a drum's mean speed in a step can come by half of what it can gain in a whole step, and from
+        step to step by all of it.
+        """
+        winch = self.hoists.winch
+        gain = np.repeat((self.period * winch.radius * winch.max_acceleration)[:, None], horizon, axis=1)
+        gain[:, 0] *= 0.5
+        return gain
+
+
+class PredictiveControl:
+    """Model-predictive control; the agents' Kalman filters predict the motion."""
+
+    def __init__(self, config: PlanningConfig | None = None) -> None:
+        self.config = config or PlanningConfig()
+        sensed = self.config.sensors is not None
+        self.name = "predictive control" if sensed else "predictive control (state)"
+        self.knows = Knowledge.SENSORS if sensed else Knowledge.STATE
+        self._cranes: Sequence[Crane] = ()
+        self._period = 0.1
+        self._planner: Planner | None = None
+
+    def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
+        """Begin N episodes; of the scenarios only the crane is looked at."""
+        self._cranes = [scenario.crane for scenario in scenarios]
+        self._period, self._planner = control_period, None
+
+    def act(self, observation: Observation, time: float) -> FloatArray:
+        """Drum speed commands (N,) rad/s for readings (N, 10), or observations (N, 14) of the full state."""
+        if self._planner is None:
+            self._planner = Planner(len(observation), self._period, self.config)
+            self._planner.start(observation, self._cranes)
+        else:
+            self._planner.advance(observation)
+        return self._planner.command(self._planner.plan().rope_speed)

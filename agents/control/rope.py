@@ -38,6 +38,10 @@ class RopeModel:
         # A change of p at the start of the step is as good as a p that was there before it.
         return cls(a, a[:, :, 3].copy())
 
+    def some(self, rows: Rows) -> RopeModel:
+        """Model of these rows alone."""
+        return RopeModel(self.a[rows], self.b[rows])
+
     def replace(self, rows: Rows, other: RopeModel) -> None:
         """Put the rows of another model in the place of these."""
         self.a[rows], self.b[rows] = other.a, other.b

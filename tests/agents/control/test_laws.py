@@ -10,7 +10,7 @@ from aframe_env.task import SENSED, STATE
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.feedback import Feedback
 from agents.control.inverse_dynamics import InverseDynamics, RequiredRope
-from agents.control.predictive import PredictiveControl
+from agents.control.predictive import PlanningConfig, PredictiveControl
 from agents.control.regulator import Gains
 from agents.control.rope import RopeModel
 from agents.control.winch import WinchModel
@@ -191,7 +191,7 @@ SENSED_LAWS = {
 }
 STATE_LAWS = {
     "feedback": on_the_state,
-    "predictive control": lambda: PredictiveControl(sensors=None),
+    "predictive control": lambda: PredictiveControl(PlanningConfig(sensors=None)),
     "output zero": lambda: output_zero(FeatureConfig()),
 }
 
@@ -266,7 +266,7 @@ def test_a_load_pin_that_is_off_by_a_tenth_is_borne(make, factor):
     "make",
     [
         lambda sensors, waves: Feedback(sensors, waves=waves),
-        lambda sensors, waves: PredictiveControl(sensors=sensors, waves=waves),
+        lambda sensors, waves: PredictiveControl(PlanningConfig(sensors=sensors, waves=waves)),
     ],
     ids=["feedback", "predictive control"],
 )

@@ -3,12 +3,14 @@ import pytest
 from scipy.optimize import LinearConstraint, minimize
 
 from aframe_env import Crane, InvalidValue, ScenarioDistribution, Winch
+from aframe_env.config import TaskConfig
 from aframe_env.scenario.crane import GRAVITY
+from aframe_env.simulation import Simulation
 from aframe_env.task import SENSED, STATE
 from agents.control.feedback import Feedback
-from agents.control.predictive import PredictiveControl
+from agents.control.predictive import Planner, PlanningConfig, PredictiveControl
 from agents.control.rope import RopeModel
-from agents.policy import DrumStill, Knowledge
+from agents.policy import DrumStill
 from agents.rollout import held_out_scenarios, run
 
 PERIOD = 0.1
@@ -20,26 +22,15 @@ WINCH = Winch(max_rope_speed=0.8, max_rope_acceleration=0.5)
 def law(rows, crane):
     """The law once it has seen its first observations, and the models of its loads."""
     scenarios = held_out_scenarios(ScenarioDistribution(crane=crane), rows)
-    policy = PredictiveControl(sensors=None, horizon=HORIZON, effort=EFFORT)
-    frequency = []
-
-    class Begun:
-        name, knows = "begun", Knowledge.STATE
-
-        def reset(self, scenarios, control_period):
-            policy.reset(scenarios, control_period)
-
-        def act(self, observation, time):
-            if not frequency:
-                tension, length = (
-                    observation[:, index(name)].astype(float) for name in ("rope_tension", "rope_length")
-                )
-                frequency.extend(np.sqrt(crane.rope.axial_stiffness / (length * tension / GRAVITY)))
-                return policy.act(observation, time)
-            return np.zeros(rows)
-
-    run(Begun(), scenarios, episode_duration=1.0)
-    return policy, RopeModel.of(np.array(frequency), policy.damping_ratio, PERIOD)
+    config = PlanningConfig(sensors=None, horizon=HORIZON, effort=EFFORT)
+    simulation = Simulation(rows, TaskConfig(scenario=scenarios[0]))
+    simulation.reset_rows(np.arange(rows), [(scenario, 0) for scenario in scenarios])
+    observation = simulation.observe()
+    planner = Planner(rows, PERIOD, config)
+    planner.start(observation, [crane] * rows)
+    tension, length = (observation[:, index(name)].astype(float) for name in ("rope_tension", "rope_length"))
+    frequency = np.sqrt(crane.rope.axial_stiffness / (length * tension / GRAVITY))
+    return planner, RopeModel.of(frequency, config.damping_ratio, PERIOD)
 
 
 def index(name):
@@ -86,23 +77,23 @@ def dense(model, row, z, pulley, drum_speed):
 
 
 def test_without_limits_the_regulator_solves_the_problem():
-    policy, model = law(3, Crane(winch=Winch(max_rope_speed=90.0, max_rope_acceleration=900.0)))
+    planner, model = law(3, Crane(winch=Winch(max_rope_speed=90.0, max_rope_acceleration=900.0)))
     rng = np.random.default_rng(1)
     z, pulley, still = rng.standard_normal((3, 4)) * 0.2, rng.standard_normal((3, HORIZON)), np.zeros(3)
     k, state = model.gains(EFFORT), z
-    changes, _ = policy.problem(z, pulley, still).solve()
+    changes, _ = planner.problem(z, pulley, still).solve()
     for step in range(HORIZON):
         wanted = -(k * state).sum(axis=1)
         assert changes[:, step] == pytest.approx(wanted, abs=1e-6)
         state = model.advance(state, wanted)
-    assert policy.first_change(z, pulley, still) == pytest.approx(-(k * z).sum(axis=1), abs=1e-9)
+    assert planner.plan_for(z, pulley, still).change[:, 0] == pytest.approx(-(k * z).sum(axis=1), abs=1e-9)
 
 
 def test_with_limits_the_solution_is_scipys():
     rows = 6
-    policy, model = law(rows, Crane(winch=WINCH))
+    planner, model = law(rows, Crane(winch=WINCH))
     z, pulley, drum_speed = situations(rows, 4)
-    first = policy.first_change(z, pulley, drum_speed)
+    first = planner.plan_for(z, pulley, drum_speed).change[:, 0]
     limited = 0
     for row in range(rows):
         hessian, gradient, matrix, low, high = dense(model, row, z[row], pulley[row], drum_speed[row])
@@ -115,7 +106,7 @@ def test_with_limits_the_solution_is_scipys():
             options={"ftol": 1e-12, "maxiter": 1000},
         )
         assert expected.success
-        found = policy.problem(z, pulley, drum_speed).rows(np.array([row])).solve()[0][0]
+        found = planner.problem(z, pulley, drum_speed).rows(np.array([row])).solve()[0][0]
         assert (matrix @ found >= low - 1e-7).all()
         assert (matrix @ found <= high + 1e-7).all()
         assert 0.5 * found @ hessian @ found + gradient @ found == pytest.approx(expected.fun, rel=1e-6, abs=1e-8)
@@ -132,7 +123,7 @@ def test_acts_alike_alone_and_in_a_batch_and_removes_the_heave(observation, leas
     still = run(DrumStill(), scenarios)
 
     def policy():
-        return PredictiveControl() if observation == "sensors" else PredictiveControl(sensors=None)
+        return PredictiveControl() if observation == "sensors" else PredictiveControl(PlanningConfig(sensors=None))
 
     together = run(policy(), scenarios, observation=observation)
     assert np.median(1.0 - together.rms / still.rms) > least
@@ -145,7 +136,7 @@ def test_preview_helps_where_the_winchs_limits_are_met():
     still = run(DrumStill(), scenarios).rms
     for observation, predictive, plain in (
         ("sensors", PredictiveControl(), Feedback()),
-        ("state", PredictiveControl(sensors=None), Feedback(None)),
+        ("state", PredictiveControl(PlanningConfig(sensors=None)), Feedback(None)),
     ):
         left = run(predictive, scenarios, observation=observation).rms
         assert (left < still).all()
@@ -154,6 +145,6 @@ def test_preview_helps_where_the_winchs_limits_are_met():
 
 def test_bad_input_is_refused():
     with pytest.raises(InvalidValue, match="horizon = 1"):
-        PredictiveControl(horizon=1)
+        PlanningConfig(horizon=1)
     with pytest.raises(InvalidValue, match=f"the policy reads {len(SENSED)}"):
         run(PredictiveControl(), held_out_scenarios(ScenarioDistribution(), 1), observation="state")
