@@ -76,6 +76,8 @@ class Plan:
     """(N, H) what the regulator would ask of the drum, as a share of what the winch can gain of speed in a step."""
     speed_demand: FloatArray
     """(N, H) likewise, of the winch's greatest speed."""
+    drum_change: FloatArray
+    """(N, H) changes of the drum's mean speed from step to step that are planned, m/s upwards."""
 
     @property
     def rope_speed(self) -> FloatArray:
@@ -153,6 +155,7 @@ class Planner:
             depth_error=error,
             acceleration_demand=acceleration_demand,
             speed_demand=speed_demand,
+            drum_change=inputs + change,
         )
 
     def problem(self, z: FloatArray, pulley: FloatArray, drum_speed: FloatArray, rows: Rows = ALL) -> BoundedTracking:

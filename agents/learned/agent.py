@@ -20,7 +20,8 @@ from aframe_env.validation import InvalidValue
 from agents import shipped
 from agents.control.expected_waves import ExpectedWaves
 from agents.learned.feature_policy import OnFeatures
-from agents.learned.features import Action, FeatureConfig, feature_names
+from agents.learned.feature_sets import feature_names
+from agents.learned.features import Action, FeatureConfig
 from agents.learned.network import Actor
 from agents.policy import FloatArray, Knowledge
 
@@ -79,7 +80,7 @@ class LearnedPolicy(OnFeatures):
             f"{self.card.algorithm} on sensors" if sensed else self.card.algorithm,
             self.card.made_for,
         )
-        expected = feature_names(self.card.sensors)
+        expected = feature_names(self.card.made_for)
         if self.card.features != expected:
             raise InvalidValue(f"the agent's features are {self.card.features}, this version makes {expected}")
 
@@ -154,7 +155,7 @@ def output_zero(config: FeatureConfig) -> LearnedPolicy:
     What a trained agent removes beyond this is learned.
     """
     sensors = config.sensors
-    features = feature_names(sensors)
+    features = feature_names(config)
     actor = Actor(len(features), 1)
     for parameter in actor.parameters():
         torch.nn.init.zeros_(parameter)

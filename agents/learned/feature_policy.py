@@ -13,7 +13,9 @@ from aframe_env.scenario import Scenario
 from aframe_env.scenario.crane import Crane
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue, require_numbers
+from agents.learned.feature_sets import features_for
 from agents.learned.features import FeatureConfig, Features
+from agents.learned.plan_features import PlanFeatures
 from agents.policy import FloatArray, Knowledge
 
 Float32Array = npt.NDArray[np.float32]
@@ -29,7 +31,7 @@ class OnFeatures(ABC):
         self.name = name
         self.knows = Knowledge.SENSORS if config.sensors else Knowledge.STATE
         self._config = config
-        self._features: Features | None = None
+        self._features: Features | PlanFeatures | None = None
         self._cranes: Sequence[Crane] = ()
 
     @abstractmethod
@@ -47,7 +49,7 @@ class OnFeatures(ABC):
     def act(self, observation: Float32Array, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s; the first call since the last reset begins the features' memory."""
         if self._features is None:
-            self._features = Features(len(observation), self._config)
+            self._features = features_for(len(observation), self._config)
             inputs = self._features.start(observation, self._cranes)
         else:
             inputs = self._features.advance(observation)

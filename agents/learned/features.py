@@ -5,7 +5,8 @@ no running statistics and means the same on every crane and in every sea. A bank
 rate as it comes, foretells the pulley's motion; on sensors, Kalman filters tell the present from the readings. The
 output says how fast the rope's upper end is to go up or down in space: with the residual action, a feed-forward takes
 up what the pulley is about to move meanwhile, so that with an output of zero the drum only follows the pulley; with the
-speed action there is nothing below the network, and the output is the drum's speed itself.
+speed action there is nothing below the network, and the output is the drum's speed itself. The agents that correct
+predictive control have features of their own: see ``agents.learned.plan_features``.
 """
 
 from __future__ import annotations
@@ -29,8 +30,8 @@ from agents.control.observer import observer_for
 from agents.control.regulator import Columns, HoistBatch, Observation
 
 Float32Array = npt.NDArray[np.float32]
-Action = Literal["residual", "speed"]
-ACTIONS: Final = ("residual", "speed")
+Action = Literal["residual", "speed", "predictive"]
+ACTIONS: Final = ("residual", "speed", "predictive")
 
 LIMIT = 20.0
 """Features are clipped to ± this."""
@@ -60,11 +61,6 @@ SENSED_FEATURES: Final = (
 )
 
 
-def feature_names(sensors: Sensors | None) -> tuple[str, ...]:
-    """Names of the features on these sensors; None for the full state."""
-    return STATE_FEATURES if sensors is None else SENSED_FEATURES
-
-
 @dataclass(frozen=True, kw_only=True)
 class FeatureConfig:
     """What features are made for."""
@@ -77,7 +73,7 @@ class FeatureConfig:
     """Motion of the pulley that is expected."""
     action: Action = "residual"
     """"residual": the output moves the rope's end, above a feed-forward that follows the pulley; "speed": it is the
-    drum's speed, as a share of the winch's."""
+    drum's speed, as a share of the winch's; "predictive": it corrects what predictive control plans."""
 
     def __post_init__(self) -> None:
         require_choice("action", self.action, ACTIONS)
@@ -94,11 +90,11 @@ class FeatureConfig:
 
 
 class Features:
-    """Features of N rows, and what their outputs ask of the winches."""
+    """Features of N rows for the residual and the speed action, and what their outputs ask of the winches."""
 
     def __init__(self, rows: int, config: FeatureConfig) -> None:
         self._action = config.action
-        self.names = feature_names(config.sensors)
+        self.names = STATE_FEATURES if config.sensors is None else SENSED_FEATURES
         self._hoists = HoistBatch(rows, config.control_period, STATE if config.sensors is None else SENSED)
         self._observer = observer_for(self._hoists, DAMPING_RATIO, config.sensors, config.waves)
         self._rise, self._turned = np.zeros((2, rows))

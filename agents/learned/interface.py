@@ -20,6 +20,7 @@ from aframe_env.scenario.crane import Crane
 from aframe_env.validation import InvalidValue, require_choice, require_number
 from agents.control.filters import ALL, FloatArray, Rows
 from agents.control.regulator import Observation
+from agents.learned.feature_sets import features_for
 from agents.learned.features import ACTIONS, STATE_FEATURES, Action, FeatureConfig, Features
 
 Float32Array = npt.NDArray[np.float32]
@@ -90,8 +91,10 @@ class LearnerFeatures:
 
     def __init__(self, rows: int, config: FeatureConfig, *, privileged: bool) -> None:
         """``privileged``: as in ``InterfaceConfig``."""
-        self._features = Features(rows, config)
-        self._privileged = Features(rows, replace(config, sensors=None)) if privileged and config.sensors else None
+        self._features = features_for(rows, config)
+        self._privileged = (
+            Features(rows, replace(config, sensors=None, action="residual")) if privileged and config.sensors else None
+        )
         self.actor_inputs = len(self._features.names)
         """Number of features that are the agent's, the first ones."""
         self.names: tuple[str, ...] = self._features.names

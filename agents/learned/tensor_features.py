@@ -27,6 +27,8 @@ class TensorFeatures:
         """``cuda``: whether the tensors are on a CUDA device, or in numba's simulator of one."""
         if config.sensors is not None:
             raise InvalidValue("sensors: the features of tensors must be of the full state")
+        if config.action == "predictive":
+            raise InvalidValue(f"action = {config.action!r}: no such plans are made for tensors")
         self._crane, self._period, self._action = crane, config.control_period, config.action
         self._invert: _Invert
         if cuda:

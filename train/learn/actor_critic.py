@@ -126,6 +126,12 @@ class TwoPathPolicy(ActorCriticPolicy):
             self.features_dim, self._actor_inputs, self._hidden
         )
 
+    def freeze_actor(self, frozen: bool) -> None:
+        """Keep the actor as it is, or let it learn again."""
+        for part in (self.mlp_extractor.actor, self.action_net):
+            part.requires_grad_(not frozen)
+        self.log_std.requires_grad_(not frozen)
+
     def to_actor(self) -> Actor:
         """Return the mean action as a plain network of its own."""
         latent = self.mlp_extractor.actor

@@ -31,7 +31,10 @@ class LearningOptions(RunOptions):
     """Observation of the agent."""
     action: Action = "residual"
     """What the network's output is: "residual" moves the rope's end, above a hand-written feed-forward that follows the
-    pulley; "speed" is the drum's speed, with nothing below it."""
+    pulley; "speed" is the drum's speed, with nothing below it; "predictive" corrects what predictive control plans."""
+    practice: int = 0
+    """Learn from so many scenarios, in half of which the winch saturates, again and again, by the share of the heave
+    that is left in each; the critic is told their waves to come. 0: from new scenarios as the task draws them."""
     scenarios: Path | None = None
     """A TOML file with a scenario or a distribution of your own to learn from; by default the package's seas."""
     control_period: float = TaskConfig.control_period
@@ -70,6 +73,7 @@ class LearningOptions(RunOptions):
         require_integer("seeds", self.seeds, low=1, high=10_000)
         require_choice("observation", self.observation, ("state", "sensors"))
         require_choice("action", self.action, ACTIONS)
+        require_integer("practice", self.practice, low=0, high=10**6)
         require_number("control_period", self.control_period, "s", low=0.01, high=2.0)
         self.config  # noqa: B018 - raises here, before anything is written
         require_integer("batch_size", self.batch_size, low=2, high=10**9)

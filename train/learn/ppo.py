@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from stable_baselines3 import PPO
 
@@ -36,6 +36,8 @@ class Options(LearningOptions):
     """PPO's clipping."""
     log_std_init: float = -1.65
     """Logarithm of the first standard deviation of an action."""
+    critic_first: int = 0
+    """Updates at the start that the critic learns from alone."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -46,13 +48,31 @@ class Options(LearningOptions):
         require_integer("n_epochs", self.n_epochs, low=1, high=1000)
         require_number("gae_lambda", self.gae_lambda, "", low=0.0, high=1.0)
         require_number("clip_range", self.clip_range, "", low=0.0, high=1.0, low_open=True)
+        require_integer("critic_first", self.critic_first, low=0, high=10**6)
         require_number("log_std_init", self.log_std_init, "", low=-20.0, high=2.0)
+
+
+class CriticFirstPPO(PPO):
+    """PPO whose critic learns alone at first: it has everything to learn where the actor has not."""
+
+    def __init__(self, critic_first: int, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self._critic_first = critic_first
+
+    def train(self) -> None:
+        """Update the networks from what was collected; in the first updates the critic only."""
+        update = self.num_timesteps // (self.n_steps * self.n_envs)
+        policy = self.policy
+        assert isinstance(policy, TwoPathPolicy)
+        policy.freeze_actor(update <= self._critic_first)
+        super().train()
 
 
 def build(options: Options) -> Learner:
     """The learner and its rows."""
     rows = make_rows(options)
-    model = PPO(
+    model = CriticFirstPPO(
+        options.critic_first,
         TwoPathPolicy,
         rows,
         n_steps=options.n_steps,
@@ -75,6 +95,12 @@ def build(options: Options) -> Learner:
     return Learner("PPO", model, rows, policy.to_actor)
 
 
+def _successor(options: Options) -> str | None:
+    if options.device == "cuda":
+        return "ppo-rsl"
+    return "ppo-predictive" if options.action == "predictive" else None
+
+
 SPEC: Final = LearnerSpec(
     command="train.ppo",
     description="Train a PPO agent to hold the load still, then compare it with the paper's drives.",
@@ -91,5 +117,5 @@ SPEC: Final = LearnerSpec(
         },
         {"n_steps": (32, 64, 128), "n_epochs": (5, 10, 15), "batch_size": (512, 1024, 2048)},
     ),
-    successor=lambda options: "ppo-rsl" if options.device == "cuda" else None,
+    successor=_successor,
 )

@@ -53,6 +53,8 @@ class Options(ppo.Options):
         super().__post_init__()
         if self.observation != "state":
             raise InvalidValue(f"observation = {self.observation!r}: must be 'state' with rows on a GPU")
+        if self.action == "predictive" or self.practice:
+            raise InvalidValue(f"action = {self.action!r}, practice = {self.practice}: not with rows on a GPU")
         require_integer("batch_size", self.batch_size, low=2, high=self.n_steps * self.n_envs)
 
 

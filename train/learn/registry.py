@@ -14,6 +14,7 @@ from train.learn.learner import LearnerSpec
 
 LEARNERS: Final = {
     "ppo": "train.learn.ppo",
+    "ppo-predictive": "train.learn.ppo_predictive",
     "ppo-rsl": "train.learn.ppo_rsl",
     "sac": "train.learn.sac",
 }

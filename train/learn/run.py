@@ -6,6 +6,7 @@ import contextlib
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -13,13 +14,21 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, serialise
-from agents.learned.features import feature_names
+from agents.learned.feature_sets import feature_names
+from agents.learned.features import Action
 from train.evaluate.run import evaluate
 from train.learn.learner import Learner, LearnerSpec, Rows
 from train.learn.options import LearningOptions
 from train.learn.registry import find_learner
 from train.shared.cli import parse
 from train.shared.run_folder import open_run, user_errors, versions, write_atomically, write_json, write_text
+
+AGENT_NAMES: Final[dict[Action, str]] = {
+    "speed": "{}",
+    "residual": "residual {}",
+    "predictive": "predictive {}",
+}
+"""Names of agents by their action, to be filled in with the learner's."""
 
 
 class ShowReduction(BaseCallback):
@@ -54,12 +63,12 @@ def to_policy(learner: Learner, options: LearningOptions) -> tuple[LearnedPolicy
     actor = learner.to_actor()
     weights = serialise(actor)
     card = AgentCard(
-        algorithm=learner.algorithm if options.action == "speed" else f"residual {learner.algorithm}",
+        algorithm=AGENT_NAMES[options.action].format(learner.algorithm),
         observation=options.observation,
         sensors=options.features.sensors,
         waves=options.features.waves,
         action=options.action,
-        features=feature_names(options.features.sensors),
+        features=feature_names(options.features),
         hidden=options.hidden,
         squashed=actor.squashed,
         control_period=options.control_period,

@@ -7,7 +7,7 @@ generator, without Gymnasium's face between them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -17,13 +17,19 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from aframe_env import task
 from aframe_env.config import TaskConfig
+from aframe_env.scenario import Scenario
 from aframe_env.simulation import Simulation
 from agents.learned.features import LIMIT, FeatureConfig
 from agents.learned.interface import Cuts, InterfaceConfig, LearnerFeatures
 from train.learn.options import LearningOptions
+from train.learn.practice import Practice
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
+
+
+GROUPS: Final = 8
+"""Groups of rows that start together where scenarios are practised on."""
 
 
 def median_reduction(error_sum: FloatArray, still_sum: FloatArray) -> float:
@@ -41,11 +47,24 @@ class TrainingVecEnv(VecEnv):
     """Rows of the task for a learner: SAME_STEP resets, infos only for the rows that finished."""
 
     def __init__(
-        self, rows: int, config: TaskConfig | None = None, interface: InterfaceConfig | None = None, *, seed: int = 0
+        self,
+        rows: int,
+        config: TaskConfig | None = None,
+        interface: InterfaceConfig | None = None,
+        *,
+        practice: Practice | None = None,
+        seed: int = 0,
     ) -> None:
-        """Make so many rows of the task; ``seed`` for the draws of scenarios."""
+        """Make so many rows of the task; ``seed`` for the draws of scenarios.
+
+        ``practice``: scenarios to draw from in the place of the task's, with their own reward and what they tell the
+        critic, at the end of an observation.
+        """
         interface = interface or InterfaceConfig()
         self._interface = interface
+        self._practice = practice
+        self._which = np.zeros(rows, dtype=np.int64)
+        """Scenario of ``practice`` that each row runs in."""
         self._simulation = simulation = Simulation(rows, config)
         self._rng = np.random.default_rng(seed)
         self._commands = np.zeros(rows)
@@ -54,9 +73,10 @@ class TrainingVecEnv(VecEnv):
             rows, FeatureConfig.of(simulation.config, interface.action), privileged=interface.privileged
         )
         self._cuts = Cuts(rows, simulation.control_period, simulation.episode_duration, interface)
+        told = practice.waves.shape[2] if practice else 0
         super().__init__(
             rows,
-            spaces.Box(-LIMIT, LIMIT, (len(self._features.names),), np.float32),
+            spaces.Box(-LIMIT, LIMIT, (len(self._features.names) + told,), np.float32),
             spaces.Box(-1.0, 1.0, (1,), np.float32),
         )
         self._return = np.zeros(rows)
@@ -82,8 +102,19 @@ class TrainingVecEnv(VecEnv):
     def reset(self) -> Float32Array:
         """Start all rows at random times of their horizon, so that they do not all end at once."""
         self._restart(np.arange(self.num_envs))
-        self._cuts.left[:] = self._rng.integers(1, self._cuts.horizon + 1, self.num_envs)
-        return self._features.values.copy()
+        if self._practice is None:
+            self._cuts.left[:] = self._rng.integers(1, self._cuts.horizon + 1, self.num_envs)
+        else:
+            # In groups: whenever rows start anew, plans are made anew for all.
+            group = self._rng.integers(1, GROUPS + 1, self.num_envs)
+            self._cuts.left[:] = np.maximum(1, self._cuts.horizon * group // GROUPS)
+        return self._observed()
+
+    def _observed(self) -> Float32Array:
+        if self._practice is None:
+            return self._features.values.copy()
+        told = self._practice.told(self._which, self._simulation.steps)
+        return np.concatenate([self._features.values, told], axis=1)
 
     def step_async(self, actions: Float32Array) -> None:
         """Take the actions (rows, 1), outputs of the agent's network."""
@@ -96,7 +127,10 @@ class TrainingVecEnv(VecEnv):
         cost = simulation.results[:, task.COST]
         self._error_sum += cost
         self._still_sum += np.square(simulation.state[:, task.PULLEY_HEAVE]) * simulation.control_period
-        rewards = self._interface.rewards(cost, simulation.control_period)
+        if self._practice is None:
+            rewards = self._interface.rewards(cost, simulation.control_period)
+        else:
+            rewards = self._practice.rewards(self._which, cost / simulation.control_period)
         self._return += rewards
         self._length += 1
         parted = simulation.results[:, task.PARTED] > 0.0
@@ -107,17 +141,18 @@ class TrainingVecEnv(VecEnv):
         if finished.any():
             infos = list(infos)
             rows = np.flatnonzero(finished)
+            last = self._observed()
             for i in rows.tolist():
                 infos[i] = {
-                    "terminal_observation": self._features.values[i].copy(),
+                    "terminal_observation": last[i],
                     "TimeLimit.truncated": not parted[i],
                     "episode": {"r": float(self._return[i]), "l": int(self._length[i]), "t": 0.0},
                 }
             self._restart(rows)
-        return self._features.values.copy(), rewards.astype(np.float32), finished, infos
+        return self._observed(), rewards.astype(np.float32), finished, infos
 
     def _restart(self, rows: npt.NDArray[np.int64]) -> None:
-        drawn = [self._simulation.draw(self._rng) for _ in rows]
+        drawn = self._draw(rows)
         cranes = [scenario.crane for scenario, _ in drawn]
         simulation = self._simulation
         simulation.reset_rows(rows, drawn)
@@ -125,6 +160,14 @@ class TrainingVecEnv(VecEnv):
         self._return[rows] = 0.0
         self._length[rows] = 0
         self._features.start(simulation.observe()[rows], simulation.state[rows], cranes, rows)
+
+    def _draw(self, rows: npt.NDArray[np.int64]) -> list[tuple[Scenario, int]]:
+        """Scenarios for these rows, and seeds of their noise."""
+        if self._practice is None:
+            return [self._simulation.draw(self._rng) for _ in rows]
+        self._which[rows] = self._rng.integers(len(self._practice.scenarios), size=len(rows))
+        seeds = self._rng.integers(2**53, size=len(rows)).tolist()
+        return [(self._practice.scenarios[i], seed) for i, seed in zip(self._which[rows], seeds, strict=True)]
 
     def close(self) -> None:
         """Nothing to close."""
@@ -154,4 +197,7 @@ class TrainingVecEnv(VecEnv):
 def make_rows(options: LearningOptions) -> TrainingVecEnv:
     """Rows of the environment for a learner."""
     torch.set_num_threads(options.threads)
-    return TrainingVecEnv(options.n_envs, options.config, options.interface, seed=options.seed)
+    practice = None
+    if options.practice:
+        practice = Practice.of(options.config, options.features, options.practice, options.seed)
+    return TrainingVecEnv(options.n_envs, options.config, options.interface, practice=practice, seed=options.seed)
