@@ -29,7 +29,7 @@ Indices = npt.NDArray[np.int64]
 
 SERIES: Final = 500_000_003
 """Series of the scenarios: this plus the seed of the training."""
-DRAWN: Final = 3
+DRAWN: Final = 5
 """As many times the scenarios that are wanted are drawn, to find enough in which the winch saturates."""
 MEAN_REWARD: Final = 0.05
 """Mean loss in a control step with an output of zero."""

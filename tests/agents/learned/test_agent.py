@@ -10,7 +10,8 @@ from aframe_env.env import AFrameHeaveEnv
 from aframe_env.scenario.sensors import Sensors
 from agents.control.expected_waves import ExpectedWaves
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, load, serialise
-from agents.learned.features import STATE_FEATURES, feature_names
+from agents.learned.feature_sets import feature_names
+from agents.learned.features import ACTIONS, STATE_FEATURES, FeatureConfig
 from agents.learned.network import Actor
 from agents.policy import Knowledge
 from agents.rollout import held_out_scenarios, run
@@ -21,7 +22,7 @@ WAVES = ExpectedWaves(frequency=(0.5, 0.7, 0.9, 1.2), variance=(0.05, 0.1, 0.1, 
 def agent(observation="state", hidden=8, action="residual"):
     torch.manual_seed(1)
     sensors = None if observation == "state" else Sensors()
-    features = feature_names(sensors)
+    features = feature_names(FeatureConfig(sensors=sensors, waves=WAVES, action=action))
     actor = Actor(len(features), hidden)
     weights = serialise(actor)
     card = AgentCard(
@@ -46,7 +47,7 @@ def write(folder, policy, weights, **changes):
     (folder / CARD).write_text(json.dumps({**json.loads(card_text(policy.card)), **changes}))
 
 
-@pytest.mark.parametrize("action", ["residual", "speed"])
+@pytest.mark.parametrize("action", ACTIONS)
 @pytest.mark.parametrize("observation", ["state", "sensors"])
 def test_an_agent_comes_back_from_its_folder_as_it_was(observation, action, tmp_path):
     policy, weights = agent(observation, action=action)

@@ -14,7 +14,8 @@ import aframe_env
 from aframe_env import InvalidValue, ScenarioDistribution
 from agents import AgentInterface, AgentVectorInterface, FeaturePolicy, InterfaceConfig
 from agents.learned.agent import output_zero
-from agents.learned.features import SENSED_FEATURES, STATE_FEATURES, FeatureConfig, Features
+from agents.learned.feature_sets import features_for
+from agents.learned.features import ACTIONS, SENSED_FEATURES, STATE_FEATURES, FeatureConfig
 from agents.rollout import held_out_scenarios, run
 
 OBSERVATIONS = pytest.mark.parametrize("observation", ["state", "sensors"])
@@ -40,13 +41,13 @@ def outputs(steps, rows, seed=1):
     return np.random.default_rng(seed).uniform(-1.0, 1.0, (steps, rows, 1)).astype(np.float32)
 
 
-@pytest.mark.parametrize("action", ["residual", "speed"])
+@pytest.mark.parametrize("action", ACTIONS)
 @OBSERVATIONS
 def test_observations_are_the_agents_own_features(observation, action):
     env, bare = AgentInterface(scalar(observation), action=action), scalar(observation)
     seen, _ = env.reset(seed=3)
     first, _ = bare.reset(seed=3)
-    features = Features(1, FeatureConfig.of(bare.unwrapped.simulation.config, action))
+    features = features_for(1, FeatureConfig.of(bare.unwrapped.simulation.config, action))
     assert env.feature_names == features.names
     np.testing.assert_array_equal(seen, features.start(first[None], [bare.unwrapped.scenario.crane])[0])
     for output in outputs(40, 1)[:, 0]:
@@ -214,7 +215,10 @@ def test_outputs_that_are_none_are_refused(function, words):
         (lambda: AgentInterface(scalar(), drift=1.0), "unknown argument 'drift': must be one of action, drift_limit"),
         (lambda: AgentInterface(scalar(), drift_limit=0.0), r"drift_limit = 0.0 m: must be in \(0, 1000\] m"),
         (lambda: AgentInterface(scalar(), horizon=-1.0), r"horizon = -1.0 s"),
-        (lambda: AgentInterface(scalar(), action="mine"), "action = 'mine': must be one of 'residual', 'speed'"),
+        (
+            lambda: AgentInterface(scalar(), action="mine"),
+            "action = 'mine': must be one of 'residual', 'speed', 'predictive'",
+        ),
         (lambda: AgentInterface(scalar(), reward="mine"), "reward = 'mine': must be one of 'training', 'task'"),
     ],
 )
