@@ -49,7 +49,7 @@ from aframe_env.scenario.scenario import Scenario
 from aframe_env.scenario.sea import Sea, SeaMotion
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.scenario.vessel import Vessel
-from aframe_env.serialization import read_toml, strict_converter, structure, without_none
+from aframe_env.serialization import plain, read_toml, strict_converter, structure
 from aframe_env.validation import InvalidValue, require_choice
 
 _SECTIONS: Mapping[str, type[Section]] = {
@@ -61,7 +61,7 @@ _SECTIONS: Mapping[str, type[Section]] = {
 }
 _KINDS = ("scenario", "distribution")
 _MOTIONS = ("harmonic", "sea", "recorded")
-_SUPPLY = "supply"
+_SUPPLY = Path("supply")
 
 
 def read_scenario(path: str | Path) -> Scenario:
@@ -132,18 +132,28 @@ def scenario_text(source: ScenarioSource) -> str:
 
     A vessel or a record that was not read from a file cannot be written, and raises ``InvalidValue``.
     """
+    return tomli_w.dumps(scenario_data(source))
+
+
+def scenario_data(source: ScenarioSource) -> dict[str, Any]:
+    """What that file says, as plain data of TOML or JSON; raises as ``scenario_text`` does."""
     converter = _converter(Path())
     if isinstance(source, Scenario):
-        return tomli_w.dumps(without_none(converter.unstructure(source)))
+        return dict(plain(converter.unstructure(source)))
     table = {each.name: getattr(source, each.name) for each in fields(source)}
     table["vessel"], table["deck_position"] = _vessel_name(source.vessel), list(source.vessel.deck_position)
     table["records"] = [_record_file(record) for record in source.records]
-    plain = {name: converter.unstructure(value) for name, value in table.items()}
-    return tomli_w.dumps(without_none({"kind": "distribution", **plain}))
+    data = {name: converter.unstructure(value) for name, value in table.items()}
+    return dict(plain({"kind": "distribution", **data}))
 
 
 def _converter(folder: Path) -> Converter:
     converter = strict_converter()
+
+    def path(value: Any, _: Any) -> Path:
+        if not isinstance(value, str | Path):
+            raise InvalidValue(f"{value!r}: must be the name of a file")
+        return Path(value)
 
     def stress_point(value: Any, _: Any) -> StressPoint:
         return StressPoint(*converter.structure(value, tuple[float, float, float, float, float]))
@@ -153,7 +163,7 @@ def _converter(folder: Path) -> Converter:
         return converter.structure(rest, _SECTIONS[kind])
 
     def member(value: Any, _: Any) -> MemberSection:
-        if isinstance(value, list):
+        if isinstance(value, list | tuple):
             return converter.structure(value, tuple[Section, ...])
         return section(value, None)
 
@@ -174,6 +184,7 @@ def _converter(folder: Path) -> Converter:
     def peak_enhancement(value: Any, _: Any) -> Range | str:
         return value if isinstance(value, str) else interval(value, None)
 
+    converter.register_structure_hook(Path, path)
     converter.register_structure_hook(StressPoint, stress_point)
     converter.register_structure_hook_func(lambda kind: kind == MemberSection, member)
     converter.register_structure_hook_func(lambda kind: kind == Section, section)
@@ -186,14 +197,14 @@ def _converter(folder: Path) -> Converter:
     harmonic = converter.get_unstructure_hook(HarmonicMotion)
     converter.register_unstructure_hook(HarmonicMotion, lambda m: {"kind": "harmonic", **harmonic(m)})
     for name, cls in _SECTIONS.items():
-        plain = converter.get_unstructure_hook(cls)
-        converter.register_unstructure_hook(cls, lambda s, n=name, p=plain: {"kind": n, **p(s)})
+        section_data = converter.get_unstructure_hook(cls)
+        converter.register_unstructure_hook(cls, lambda s, n=name, data=section_data: {"kind": n, **data(s)})
     return converter
 
 
 def _kind(value: Any, kinds: tuple[str, ...]) -> tuple[str, dict[str, Any]]:
     """The kind that a table names, and the rest of the table."""
-    if not isinstance(value, dict):
+    if not isinstance(value, Mapping):
         raise InvalidValue(f"{value!r}: must be a table with a kind, one of {', '.join(kinds)}")
     if "kind" not in value:
         raise InvalidValue(f"key 'kind' is missing: must be one of {', '.join(map(repr, kinds))}")
@@ -205,7 +216,7 @@ def _kind(value: Any, kinds: tuple[str, ...]) -> tuple[str, dict[str, Any]]:
 class _Recorded:
     """``[motion]`` of the kind "recorded": a file, and which stretch of it."""
 
-    file: str
+    file: Path
     start: float = 0.0
     """s from the first sample."""
     duration: float | None = None
@@ -217,7 +228,7 @@ class _SeaMotion:
     """``[motion]`` of the kind "sea"."""
 
     sea: Sea
-    vessel: str = _SUPPLY
+    vessel: Path = _SUPPLY
     deck_position: tuple[float, float, float] | None = None
 
 
@@ -240,7 +251,7 @@ class _Distribution:
     spectrum: str = ScenarioDistribution.spectrum
     spreading: int | None = ScenarioDistribution.spreading
     components: int = ScenarioDistribution.components
-    vessel: str = _SUPPLY
+    vessel: Path = _SUPPLY
     deck_position: tuple[float, float, float] | None = None
     load_mass: Range = ScenarioDistribution.load_mass
     rope_length: Range = ScenarioDistribution.rope_length
@@ -248,7 +259,7 @@ class _Distribution:
     ramp: float = ScenarioDistribution.ramp
     crane: Crane = field(default_factory=Crane)
     sensors: Sensors = field(default_factory=Sensors)
-    records: tuple[str, ...] = ()
+    records: tuple[Path, ...] = ()
     window: float = ScenarioDistribution.window
 
 
@@ -262,7 +273,7 @@ def _distribution(table: _Distribution, folder: Path, source: str) -> ScenarioDi
         raise InvalidValue(f"{source}: {error}") from error
 
 
-def _vessel(name: str, deck_position: tuple[float, float, float] | None, folder: Path) -> Vessel:
+def _vessel(name: Path, deck_position: tuple[float, float, float] | None, folder: Path) -> Vessel:
     vessel = Vessel.supply() if name == _SUPPLY else Vessel.from_csv(folder / name)
     if deck_position not in (None, vessel.deck_position):
         vessel = replace(vessel, deck_position=deck_position)
@@ -272,7 +283,7 @@ def _vessel(name: str, deck_position: tuple[float, float, float] | None, folder:
 def _vessel_name(vessel: Vessel) -> str:
     if vessel.path is None:
         raise InvalidValue(f"vessel {vessel.name!r} was not read from a file: a scenario file cannot name it")
-    return _SUPPLY if vessel.path == Vessel.supply().path else str(vessel.path.resolve())
+    return str(_SUPPLY if vessel.path == Vessel.supply().path else vessel.path.resolve())
 
 
 def _record_file(record: RecordedMotion) -> str:

@@ -97,6 +97,7 @@ class Features:
     """Features of N rows, and what their outputs ask of the winches."""
 
     def __init__(self, rows: int, config: FeatureConfig) -> None:
+        self.rows = rows
         self._action = config.action
         self.names = feature_names(config.sensors)
         self._hoists = HoistBatch(rows, config.control_period, STATE if config.sensors is None else SENSED)
