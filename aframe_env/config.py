@@ -16,7 +16,7 @@ from aframe_env.flexible_engine import Mesh, mesh_of
 from aframe_env.scenario import Scenario, ScenarioDistribution, ScenarioSource, Sensors
 from aframe_env.scenario.file import scenario_data, scenario_source
 from aframe_env.serialization import plain, strict_converter, structure
-from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
+from aframe_env.validation import InvalidValue, require_choice, require_integer, require_known, require_number
 
 Model = Literal["simplified", "rfem"]
 MODELS: Final = ("simplified", "rfem")
@@ -54,7 +54,7 @@ class TaskConfig:
         require_number("control_period", self.control_period, "s", low=1e-3, high=2.0)
         require_number("episode_duration", self.episode_duration, "s", low=self.control_period, high=LONGEST)
         if isinstance(self.observation, Mapping):
-            sensors = structure(strict_converter(), self.observation, Sensors, "observation")
+            sensors = structure(strict_converter(), plain(self.observation), Sensors, "observation")
             object.__setattr__(self, "observation", sensors)
         if isinstance(self.rfes, list):
             object.__setattr__(self, "rfes", tuple(self.rfes))
@@ -94,7 +94,7 @@ class TaskConfig:
 
     def lasting(self, steps: int | None) -> TaskConfig:
         """Return the same task with episodes of so many control steps; None: as long as they are."""
-        if steps is None:
+        if steps is None or steps == self.steps:
             return self
         require_integer("max_episode_steps", steps, low=1, high=int(LONGEST / self.control_period))
         return replace(self, episode_duration=steps * self.control_period)
@@ -142,9 +142,6 @@ def plain_spec(spec: EnvSpec | None, config: TaskConfig) -> EnvSpec | None:
 
 
 def _known(arguments: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return them. Raises ``InvalidValue`` where one is no field of a task."""
-    known = sorted(each.name for each in fields(TaskConfig) if each.init)
-    for name in arguments:
-        if name not in known:
-            raise InvalidValue(f"unknown argument {name!r}: must be one of {', '.join(known)}")
+    """Return them. Raises ``UnexpectedArgument`` where one is no field of a task."""
+    require_known(arguments, (each.name for each in fields(TaskConfig) if each.init))
     return arguments

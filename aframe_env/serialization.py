@@ -56,7 +56,7 @@ def structure(converter: Converter, data: Any, kind: type[T], source: str) -> T:
 
 
 def plain(value: Any) -> Any:
-    """Turn mappings, sequences and numbers of NumPy into what JSON and TOML have.
+    """Turn mappings, sequences, paths and numbers of NumPy into what JSON and TOML have.
 
     What is None is left out, as TOML has no null: it reads back as the default.
     """
@@ -64,6 +64,8 @@ def plain(value: Any) -> Any:
         return {key: plain(item) for key, item in value.items() if item is not None}
     if isinstance(value, np.generic):
         return value.item()
+    if isinstance(value, Path):
+        return str(value)
     return [plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 

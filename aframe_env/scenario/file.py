@@ -61,7 +61,7 @@ _SECTIONS: Mapping[str, type[Section]] = {
 }
 _KINDS = ("scenario", "distribution")
 _MOTIONS = ("harmonic", "sea", "recorded")
-_SUPPLY = Path("supply")
+_SUPPLY = "supply"
 
 
 def read_scenario(path: str | Path) -> Scenario:
@@ -114,6 +114,7 @@ def scenarios_of(data: Mapping[str, Any], folder: Path, source: str) -> Scenario
 def scenario_source(given: ScenarioSource | str | Path | Mapping[str, Any] | None) -> ScenarioSource:
     """Return what scenarios come from: as given, read from a file, or made of what a file would say.
 
+    In a mapping, tuples may stand for lists, and paths and NumPy's numbers are taken for what they say.
     None stands for the default distribution.
     """
     if given is None:
@@ -123,7 +124,7 @@ def scenario_source(given: ScenarioSource | str | Path | Mapping[str, Any] | Non
     if isinstance(given, str | Path):
         return read_scenarios(given)
     if isinstance(given, Mapping):
-        return scenarios_of(given, Path(), "scenario")
+        return scenarios_of(plain(given), Path(), "scenario")
     raise InvalidValue(f"scenario = {given!r}: must be a Scenario, a ScenarioDistribution, a file or a mapping")
 
 
@@ -150,11 +151,6 @@ def scenario_data(source: ScenarioSource) -> dict[str, Any]:
 def _converter(folder: Path) -> Converter:
     converter = strict_converter()
 
-    def path(value: Any, _: Any) -> Path:
-        if not isinstance(value, str | Path):
-            raise InvalidValue(f"{value!r}: must be the name of a file")
-        return Path(value)
-
     def stress_point(value: Any, _: Any) -> StressPoint:
         return StressPoint(*converter.structure(value, tuple[float, float, float, float, float]))
 
@@ -163,7 +159,7 @@ def _converter(folder: Path) -> Converter:
         return converter.structure(rest, _SECTIONS[kind])
 
     def member(value: Any, _: Any) -> MemberSection:
-        if isinstance(value, list | tuple):
+        if isinstance(value, list):
             return converter.structure(value, tuple[Section, ...])
         return section(value, None)
 
@@ -184,7 +180,6 @@ def _converter(folder: Path) -> Converter:
     def peak_enhancement(value: Any, _: Any) -> Range | str:
         return value if isinstance(value, str) else interval(value, None)
 
-    converter.register_structure_hook(Path, path)
     converter.register_structure_hook(StressPoint, stress_point)
     converter.register_structure_hook_func(lambda kind: kind == MemberSection, member)
     converter.register_structure_hook_func(lambda kind: kind == Section, section)
@@ -204,7 +199,7 @@ def _converter(folder: Path) -> Converter:
 
 def _kind(value: Any, kinds: tuple[str, ...]) -> tuple[str, dict[str, Any]]:
     """The kind that a table names, and the rest of the table."""
-    if not isinstance(value, Mapping):
+    if not isinstance(value, dict):
         raise InvalidValue(f"{value!r}: must be a table with a kind, one of {', '.join(kinds)}")
     if "kind" not in value:
         raise InvalidValue(f"key 'kind' is missing: must be one of {', '.join(map(repr, kinds))}")
@@ -216,7 +211,7 @@ def _kind(value: Any, kinds: tuple[str, ...]) -> tuple[str, dict[str, Any]]:
 class _Recorded:
     """``[motion]`` of the kind "recorded": a file, and which stretch of it."""
 
-    file: Path
+    file: str
     start: float = 0.0
     """s from the first sample."""
     duration: float | None = None
@@ -228,7 +223,7 @@ class _SeaMotion:
     """``[motion]`` of the kind "sea"."""
 
     sea: Sea
-    vessel: Path = _SUPPLY
+    vessel: str = _SUPPLY
     deck_position: tuple[float, float, float] | None = None
 
 
@@ -251,7 +246,7 @@ class _Distribution:
     spectrum: str = ScenarioDistribution.spectrum
     spreading: int | None = ScenarioDistribution.spreading
     components: int = ScenarioDistribution.components
-    vessel: Path = _SUPPLY
+    vessel: str = _SUPPLY
     deck_position: tuple[float, float, float] | None = None
     load_mass: Range = ScenarioDistribution.load_mass
     rope_length: Range = ScenarioDistribution.rope_length
@@ -259,7 +254,7 @@ class _Distribution:
     ramp: float = ScenarioDistribution.ramp
     crane: Crane = field(default_factory=Crane)
     sensors: Sensors = field(default_factory=Sensors)
-    records: tuple[Path, ...] = ()
+    records: tuple[str, ...] = ()
     window: float = ScenarioDistribution.window
 
 
@@ -273,7 +268,7 @@ def _distribution(table: _Distribution, folder: Path, source: str) -> ScenarioDi
         raise InvalidValue(f"{source}: {error}") from error
 
 
-def _vessel(name: Path, deck_position: tuple[float, float, float] | None, folder: Path) -> Vessel:
+def _vessel(name: str, deck_position: tuple[float, float, float] | None, folder: Path) -> Vessel:
     vessel = Vessel.supply() if name == _SUPPLY else Vessel.from_csv(folder / name)
     if deck_position not in (None, vessel.deck_position):
         vessel = replace(vessel, deck_position=deck_position)
@@ -283,7 +278,7 @@ def _vessel(name: Path, deck_position: tuple[float, float, float] | None, folder
 def _vessel_name(vessel: Vessel) -> str:
     if vessel.path is None:
         raise InvalidValue(f"vessel {vessel.name!r} was not read from a file: a scenario file cannot name it")
-    return str(_SUPPLY if vessel.path == Vessel.supply().path else vessel.path.resolve())
+    return _SUPPLY if vessel.path == Vessel.supply().path else str(vessel.path.resolve())
 
 
 def _record_file(record: RecordedMotion) -> str:

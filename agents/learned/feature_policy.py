@@ -78,7 +78,7 @@ class OnFeatures(ABC):
             inputs = memory.start(rows, [crane] * count)
         else:
             if not isinstance(state, Features) or state.rows != count:
-                what = f"of {state.rows} rows" if isinstance(state, Features) else repr(state)
+                what = f"a memory of {state.rows}" if isinstance(state, Features) else repr(state)
                 raise InvalidValue(
                     f"state = {what}: must be what the last predict() of {count} rows returned, or None at the start"
                 )
