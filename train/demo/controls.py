@@ -79,7 +79,7 @@ class Controls:
         """Let ``act`` turn a page's camera when a view is asked for there."""
 
         @self._views.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle[str]]) -> None:
+        def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
             if event.client is not None:
                 act(event.client, event.target.value)
 

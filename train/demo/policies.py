@@ -12,7 +12,7 @@ from aframe_env import task
 from aframe_env.config import TaskConfig
 from aframe_env.validation import InvalidValue
 from agents.policy import Policy
-from agents.registry import DRUM_STILL, BuildContext, choose
+from agents.registry import DRUM_STILL, OPTIMUM, BuildContext, choose
 from train.evaluate.run import observation_of, require_period
 
 DURATION: Final = 300.0
@@ -60,9 +60,9 @@ def build(text: str, sensors: bool) -> tuple[Policy, task.Observation]:
     ``sensors`` decides for a policy that is made for neither observation.
     """
     spec = choose(text)
-    if spec.for_each_scenario:
+    if spec.for_each_scenario or spec.name == OPTIMUM.name:
         raise InvalidValue(
-            f"policy = {text!r}: is optimised for each scenario beforehand: must be one that acts as it goes, such as "
+            f"policy = {text!r}: is optimised beforehand for each scenario: must be one that acts as it goes, such as "
             "'predictive control'"
         )
     config = TaskConfig(episode_duration=DURATION, observation="sensors" if sensors else "state")

@@ -150,7 +150,7 @@ def frame_parts(crane: Crane) -> Iterator[Part]:
         middle = 0.42 * foot + 0.58 * end
         cylinders.append(tube(foot, middle, 0.34))
         rods.append(tube(middle, end, 0.18))
-        joints += [box(np.array(p) - 0.6, np.array(p) + [0.6, 0.6, 0.5]) for p in (leg(y, 0.0), foot)]
+        joints += [box(np.subtract(p, 0.6), np.add(p, (0.6, 0.6, 0.5))) for p in (leg(y, 0.0), foot)]
     steel.append(tube(leg(-width, top), leg(width, top), 0.48, 16))
     x, y, z = crane.drum_position
     for side in (-1.55, 1.55):

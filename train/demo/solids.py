@@ -3,38 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
 from trimesh import Trimesh
 from trimesh.creation import box as centred_box
 from trimesh.creation import cylinder, torus
-from trimesh.transformations import rotation_matrix, translation_matrix
 from trimesh.util import concatenate
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 
-def box(low: Sequence[float], high: Sequence[float]) -> Trimesh:
+def box(low: npt.ArrayLike, high: npt.ArrayLike) -> Trimesh:
     """Box between two opposite corners (3,)."""
-    return centred_box(bounds=[low, high])
+    return cast(Trimesh, centred_box(bounds=np.array([low, high])))
 
 
-def tube(start: Sequence[float], end: Sequence[float], radius: float, sections: int = 12) -> Trimesh:
+def tube(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sections: int = 12) -> Trimesh:
     """Round bar between two points (3,)."""
-    return cylinder(radius=radius, segment=[start, end], sections=sections)
+    return cast(Trimesh, cylinder(radius=radius, segment=np.array([start, end]), sections=sections))
 
 
 def ring(radius: float, thickness: float) -> Trimesh:
     """Flat-lying ring about the origin; ``thickness`` is its bar's radius."""
-    return torus(major_radius=radius, minor_radius=thickness, major_sections=48, minor_sections=8)
+    return cast(Trimesh, torus(major_radius=radius, minor_radius=thickness, major_sections=48, minor_sections=8))
 
 
 def wheel(radius: float, width: float, spokes: int = 6) -> Trimesh:
     """Flange with spokes about the origin, its axle along y."""
     rim = torus(major_radius=radius, minor_radius=0.12 * radius, major_sections=32, minor_sections=8)
-    rim.apply_transform(rotation_matrix(0.5 * np.pi, [1.0, 0.0, 0.0]))
+    rim.vertices = rim.vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
     angles = np.linspace(0.0, 2.0 * np.pi, spokes, endpoint=False)
     tips = radius * np.stack([np.cos(angles), np.zeros(spokes), np.sin(angles)], axis=1)
     bars = [tube((0.0, 0.0, 0.0), tip, 0.07 * radius, 6) for tip in tips]
@@ -42,14 +42,9 @@ def wheel(radius: float, width: float, spokes: int = 6) -> Trimesh:
     return together([rim, hub, *bars])
 
 
-def moved(mesh: Trimesh, by: Sequence[float]) -> Trimesh:
-    """The same, shifted by (3,)."""
-    return mesh.copy().apply_transform(translation_matrix(by))
-
-
 def together(meshes: Sequence[Trimesh]) -> Trimesh:
     """Several meshes as one."""
-    return concatenate(list(meshes))
+    return cast(Trimesh, concatenate(list(meshes)))
 
 
 def grid_faces(rows: int, columns: int) -> IntArray:

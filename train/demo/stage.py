@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -34,7 +35,7 @@ from train.demo.ship_model import (
     pulley_parts,
     ship_parts,
 )
-from train.demo.solids import FloatArray, box, grid_faces, ring, sheet, together, tube
+from train.demo.solids import FloatArray, grid_faces, ring, sheet, together, tube
 
 TARGET: Final = -33.0
 """Height at which the load's target level is drawn, m."""
@@ -126,7 +127,7 @@ class Stage:
         self._pulley = self._scene.add_frame("/ship/pulley", show_axes=False, position=(x - PULLEY_RADIUS, y, z))
         self._add("/ship/pulley", pulley_parts())
         points = _hoist(crane)
-        bars = [tube(*ends, _ROPE_RADIUS, 6) for ends in zip(points[:-1], points[1:], strict=True)]
+        bars = [tube(*ends, _ROPE_RADIUS, 6) for ends in pairwise(points)]
         self._mesh("/ship/hoist", Part("rope", palette.ROPE, together(bars)))
 
     def show(self, moment: Moment) -> None:
@@ -229,7 +230,7 @@ class Stage:
     def _show_water(self, water: Water, time: float) -> None:
         heights = np.stack([water.heights(_X, float(y), time) for y in _Y], axis=1)
         for name, (vertices, _) in _block(heights).items():
-            self._water[name].vertices = vertices
+            self._water[name].vertices = vertices.astype(np.float32)
 
     def _show_ropes(self, scene: Scene, driven: FloatArray, still: FloatArray) -> None:
         """Let the drawn ends of the rope hang from the pulley and stand on the loads, in the line between them."""

@@ -61,6 +61,7 @@ class Viewer:
         camera.fov, camera.near, camera.far = FIELD_OF_VIEW, 1.0, 2000.0
         camera.position, camera.look_at = CAMERAS["Overview"].place(1.2), CAMERAS["Overview"].look_at
         self._server.on_client_connect(self._stage.view)
+        self._time = 0.0
         self._setting = self._controls.setting()
         self._begin(self._setting)
 
