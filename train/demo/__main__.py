@@ -49,8 +49,6 @@ def run(options: Options, console: Console) -> int:
         viewer.play()
     except KeyboardInterrupt:
         console.print("ended")
-    finally:
-        viewer.end()
     return 0
 
 

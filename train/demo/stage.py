@@ -77,7 +77,7 @@ CAMERAS: Final = {
     "Overview": Camera((44.0, -150.0, 34.0), (-17.0, 0.0, -12.0), 114.0),
     "Ship": Camera((62.0, -84.0, 34.0), (-4.0, 0.0, 1.0), 58.0),
     "Load": Camera((34.0, -34.0, -25.0), (8.0, 1.5, -32.0), 21.0),
-    "Upright": Camera((70.0, -120.0, -8.0), (-1.0, 0.0, -40.0), 54.0),
+    "Upright": Camera((70.0, -120.0, -28.0), (8.0, 0.0, -53.0), 72.0),
 }
 """Views by name; the last one, of the stern down to the load, is for a telephone: above the panel."""
 

@@ -66,7 +66,13 @@ class Viewer:
         self._begin(self._setting)
 
     def play(self) -> None:
-        """Play until ``end`` is called from another thread."""
+        """Play until ``end`` is called from another thread, or Ctrl-C; then close the server."""
+        try:
+            self._play()
+        finally:
+            self._server.stop()
+
+    def _play(self) -> None:
         wanted, changed = self._setting, 0.0
         last = shown = drawn = time.perf_counter()
         while not self._ended.is_set():
@@ -95,9 +101,8 @@ class Viewer:
             self._ended.wait(max(drawn - time.perf_counter(), 0.0))
 
     def end(self) -> None:
-        """Close the server."""
+        """Let ``play`` come to its end."""
         self._ended.set()
-        self._server.stop()
 
     def _begin(self, setting: Setting, at: float = RUN_IN) -> None:
         """Begin a lift, and pass over its first seconds."""
