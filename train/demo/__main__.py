@@ -1,6 +1,6 @@
 """Watch a lift in the browser, live, and change sea, load and policy while it runs (extra ``demo``).
 
-``python -m train.demo``; ``--policies results/agents/ppo mine:law`` offers those in place of the usual ones.
+``python -m train.demo``; ``--policies ppo mine:law`` offers those in place of the usual ones.
 """
 
 from __future__ import annotations

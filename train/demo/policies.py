@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Final
 
 from aframe_env import task
@@ -33,8 +32,8 @@ class Choice:
 
 
 _AGENTS: Final = (
-    Choice("trained agent, PPO", "results/agents/ppo", "results/agents/ppo-sensors"),
-    Choice("trained agent, SAC", "results/agents/sac", "results/agents/sac-sensors"),
+    Choice("trained agent, PPO", "ppo", "ppo-sensors"),
+    Choice("trained agent, SAC", "sac", "sac-sensors"),
 )
 _LAWS: Final = tuple(
     Choice(name, f"{name} (state)", name) for name in ("predictive control", "feed-forward + feedback")
@@ -49,8 +48,7 @@ def choices(texts: Sequence[str]) -> list[Choice]:
     if texts:
         return [Choice(build(text, sensors=True)[0].name, text, text) for text in dict.fromkeys(texts)]
     still = Choice(DRUM_STILL.name, DRUM_STILL.name, DRUM_STILL.name)
-    shipped = [agent for agent in _AGENTS if Path(agent.on_state).is_dir() and Path(agent.on_sensors).is_dir()]
-    return [*shipped, *_LAWS, still]
+    return [*_AGENTS, *_LAWS, still]
 
 
 @cache
