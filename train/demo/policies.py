@@ -46,7 +46,10 @@ def choices(texts: Sequence[str]) -> list[Choice]:
     Raises ``InvalidValue`` where one is not known, or cannot act as it goes.
     """
     if texts:
-        return [Choice(build(text, sensors=True)[0].name, text, text) for text in dict.fromkeys(texts)]
+        names = {text: build(text, sensors=True)[0].name for text in texts}
+        taken = list(names.values())
+        # Agents that differ in their seed alone have one name: they are told apart by what was asked for.
+        return [Choice(name if taken.count(name) == 1 else text, text, text) for text, name in names.items()]
     still = Choice(DRUM_STILL.name, DRUM_STILL.name, DRUM_STILL.name)
     return [*_AGENTS, *_LAWS, still]
 

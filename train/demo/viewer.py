@@ -15,6 +15,7 @@ from train.demo.controls import Controls
 from train.demo.episode import RUN_IN, Episode, Setting
 from train.demo.policies import choices
 from train.demo.stage import CAMERAS, FIELD_OF_VIEW, Stage
+from train.shared.cli import program
 
 FRAMES_PER_SECOND: Final = 30.0
 _FIGURES_PER_SECOND: Final = 5.0
@@ -36,7 +37,9 @@ def require_free_port(host: str, port: int) -> None:
             if not taken:
                 return
             free = probe.getsockname()[1]
-    raise InvalidValue(f"port = {port}: is in use or not allowed; choose another: python -m train.demo --port {free}")
+    raise InvalidValue(
+        f"port = {port}: is in use or not allowed; choose another: {program('train.demo')} --port {free}"
+    )
 
 
 class Viewer:

@@ -65,6 +65,8 @@ def test_sensors_decide_what_a_law_is_and_sees():
 
 def test_policies_can_be_named_and_those_that_need_the_future_are_refused():
     assert [choice.name for choice in choices([LAW, "drum-still", LAW])] == [LAW, "drum still"]
+    seeds = [f"results/agents/ppo/seed-{k}" for k in (0, 1)]
+    assert [choice.name for choice in choices(seeds)] == seeds
     with pytest.raises(InvalidValue, match="must be one that acts as it goes"):
         choices(["winch-limited optimum"])
     with pytest.raises(InvalidValue, match="'nobody': must be one of"):
