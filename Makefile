@@ -5,16 +5,20 @@ BIN := .venv/bin
 
 .DEFAULT_GOAL := help
 
-.PHONY: help train drives test verify results bench check clean
+.PHONY: help train demo drives test verify results bench check clean
 
 help:
 	@echo "make train     learn to hold the load still and compare the agent (some five minutes)"
+	@echo "make demo      watch a lift in the browser, live"
 	@echo "make test      run the whole suite (some ten minutes)"
 	@echo "make check     lint, format, layers, types"
 	@echo "make drives | verify | results | bench | clean"
 
 train: .venv/installed
 	$(BIN)/python -m train.ppo $(ARGS)
+
+demo: .venv/installed-demo
+	$(BIN)/python -m train.demo $(ARGS)
 
 drives: .venv/installed
 	$(BIN)/python -m train.drives $(ARGS)
@@ -60,6 +64,10 @@ bench: .venv/installed-test .venv-peers/installed
 
 .venv/installed: pyproject.toml constraints.txt | .venv/bin/python
 	$(BIN)/python -m pip install --disable-pip-version-check -q -c constraints.txt -e .
+	touch $@
+
+.venv/installed-demo: .venv/installed
+	$(BIN)/python -m pip install --disable-pip-version-check -q -c constraints.txt -e '.[demo]'
 	touch $@
 
 .venv/installed-test: .venv/installed

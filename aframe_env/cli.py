@@ -24,6 +24,7 @@ COMMANDS: Final[Mapping[str, str]] = {
     "tune-control": "tune the gains of the control laws",
     "verify": "check the full model, or run a case of your own on it",
     "vessel": "compute a vessel's response with Capytaine",
+    "demo": "watch a lift in the browser, live",
     "render": "draw a picture of the environment",
 }
 """What each command does. ``drive-map`` is ``main()`` of ``train/drive_map.py`` or ``train/drive_map/__main__.py``."""

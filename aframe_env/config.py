@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields, replace
+from enum import Enum
 from pathlib import Path
 from typing import Any, Final, Literal
+
+from gymnasium.envs.registration import EnvSpec
 
 from aframe_env import task
 from aframe_env.flexible_engine import Mesh, mesh_of
 from aframe_env.scenario import Scenario, ScenarioDistribution, ScenarioSource, Sensors
-from aframe_env.scenario.file import scenario_source
-from aframe_env.validation import InvalidValue, require_choice, require_number
+from aframe_env.scenario.file import scenario_data, scenario_source
+from aframe_env.serialization import plain, strict_converter, structure
+from aframe_env.validation import InvalidValue, require_choice, require_integer, require_known, require_number
 
 Model = Literal["simplified", "rfem"]
 MODELS: Final = ("simplified", "rfem")
+LONGEST: Final = 1e6
+"""Longest episode, s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,10 +38,11 @@ class TaskConfig:
     """s."""
     episode_duration: float = 60.0
     """s."""
-    observation: task.Observation = "state"
+    observation: task.Observation | Mapping[str, Any] = "state"
+    """A mapping: the fields of ``Sensors``."""
     max_inner_step: float | None = None
     """s."""
-    rfes: tuple[int, int] | None = None
+    rfes: Sequence[int] | None = None
     rfem_modes: int | None = None
     source: ScenarioSource = field(init=False, repr=False, compare=False)
     """``scenario``, read."""
@@ -45,7 +52,12 @@ class TaskConfig:
     def __post_init__(self) -> None:
         require_choice("model", self.model, MODELS)
         require_number("control_period", self.control_period, "s", low=1e-3, high=2.0)
-        require_number("episode_duration", self.episode_duration, "s", low=self.control_period, high=1e6)
+        require_number("episode_duration", self.episode_duration, "s", low=self.control_period, high=LONGEST)
+        if isinstance(self.observation, Mapping):
+            sensors = structure(strict_converter(), plain(self.observation), Sensors, "observation")
+            object.__setattr__(self, "observation", sensors)
+        if isinstance(self.rfes, list):
+            object.__setattr__(self, "rfes", tuple(self.rfes))
         if not isinstance(self.observation, Sensors):
             require_choice("observation", self.observation, ("state", "sensors"))
         object.__setattr__(self, "source", scenario_source(self.scenario))
@@ -80,20 +92,56 @@ class TaskConfig:
         """Quantities of the observation."""
         return task.STATE if self.sensors is None else task.SENSED
 
+    def lasting(self, steps: int | None) -> TaskConfig:
+        """Return the same task with episodes of so many control steps; None: as long as they are."""
+        if steps is None or steps == self.steps:
+            return self
+        require_integer("max_episode_steps", steps, low=1, high=int(LONGEST / self.control_period))
+        return replace(self, episode_duration=steps * self.control_period)
+
+    def plain(self) -> dict[str, Any]:
+        """Return the arguments that are not the defaults, as data of JSON: they make the same task again.
+
+        Raises ``InvalidValue`` where the scenario has a vessel or a record that was not read from a file.
+        """
+        own = [each for each in fields(self) if each.init and getattr(self, each.name) != each.default]
+        found = {each.name: getattr(self, each.name) for each in own}
+        if "scenario" in found:
+            found["scenario"] = scenario_data(self.source)
+        if isinstance(self.observation, Sensors):
+            found["observation"] = asdict(self.observation)
+        return dict(plain(found))
+
     def replaced(self, **arguments: Any) -> TaskConfig:
         """Return the same task but for these fields."""
         return replace(self, **_known(arguments))
 
 
-def task_config(config: TaskConfig | None, arguments: Mapping[str, Any]) -> TaskConfig:
+def task_config(config: TaskConfig | Mapping[str, Any] | None, arguments: Mapping[str, Any]) -> TaskConfig:
     """Return the task of a ``config``, or the default one, but for these fields."""
-    return TaskConfig(**_known(arguments)) if config is None else config.replaced(**arguments)
+    if isinstance(config, TaskConfig):
+        return config.replaced(**arguments)
+    return TaskConfig(**_known({**(config or {}), **arguments}))
+
+
+def plain_spec(spec: EnvSpec | None, config: TaskConfig) -> EnvSpec | None:
+    """Return a face's ``spec`` with the task's arguments as data of JSON, and the steps of its episodes.
+
+    A scenario that cannot be data stays the object that it is: such a spec makes the task again, but has no JSON.
+    """
+    if spec is None:
+        return None
+    names = {"config", *(each.name for each in fields(TaskConfig))}
+    others = {name: value for name, value in spec.kwargs.items() if name not in names}
+    others = {name: value.value if isinstance(value, Enum) else value for name, value in others.items()}
+    try:
+        kwargs = {**config.plain(), **others}
+    except InvalidValue:
+        kwargs = spec.kwargs
+    return replace(spec, kwargs=kwargs, max_episode_steps=config.steps)
 
 
 def _known(arguments: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return them. Raises ``InvalidValue`` where one is no field of a task."""
-    known = sorted(each.name for each in fields(TaskConfig) if each.init)
-    for name in arguments:
-        if name not in known:
-            raise InvalidValue(f"unknown argument {name!r}: must be one of {', '.join(known)}")
+    """Return them. Raises ``UnexpectedArgument`` where one is no field of a task."""
+    require_known(arguments, (each.name for each in fields(TaskConfig) if each.init))
     return arguments

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -9,9 +10,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import gymnasium
 import numpy as np
 import numpy.typing as npt
+from gymnasium.envs.registration import EnvSpec
 
 from aframe_env import task
-from aframe_env.config import TaskConfig, task_config
+from aframe_env.config import TaskConfig, plain_spec, task_config
 from aframe_env.rendering import open_renderer
 from aframe_env.scenario import Scenario
 from aframe_env.simulation import RowState, Simulation
@@ -97,8 +99,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
       never pays.
 
     ## Information
-    `time` [s], `load_position` (3,) [m], `rope_tension` [N], `slack` (the rope was slack within the last step),
-    `omega1` [m² s] and `omega2` [m] so far, eqs. (31), (32).
+    Arrays, of shape () where no other is named: `time` [s], `load_position` (3,) [m], `rope_tension` [N], `slack` (the
+    rope was slack within the last step), `omega1` [m² s] and `omega2` [m] so far, eqs. (31), (32).
 
     With `model="rfem"` also, vectors along the deck's axes: `pulley_deflection` (3,) [m] of S on the frame;
     `foot_reactions` (2, 3) [N], forces on the frame at A_R and A_L; `servomotor_tensions` (2,) [N] of S_R and S_L;
@@ -119,10 +121,15 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
       50-1500 m.
     - `control_period`: 0.001 to 2 s (default 0.1).
     - `episode_duration`: s (default 60).
-    - `observation`: "state", "sensors", or a `Sensors`.
+    - `observation`: "state", "sensors", or a `Sensors`, also as a mapping of its fields.
     - `max_inner_step`: s; overrides the choice of the integrator's step.
+    - `max_episode_steps`: overrides `episode_duration`; also as `gymnasium.make` takes it.
     - `render_mode`: None (default); "rgb_array": `render()` returns a picture, (640, 960, 3) uint8; "human": every
-      reset and step shows one in a window. Needs the extra `render`.
+      reset and step shows one in a window. Needs the extra `render`, from the first picture on; with that one begins
+      the history that the pictures show.
+
+    `spec` has the arguments as plain data: `EnvSpec.from_json(env.spec.to_json())` makes the same task again. A vessel
+    or a record that was not read from a file has no such form.
 
     `reset(options={"scenario": ...})` takes a `Scenario` for the one episode.
     """
@@ -132,20 +139,38 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
         "render_fps": 10,
     }
 
-    def __init__(self, config: TaskConfig | None = None, *, render_mode: str | None = None, **arguments: Any) -> None:
+    def __init__(
+        self,
+        config: TaskConfig | Mapping[str, Any] | None = None,
+        *,
+        max_episode_steps: int | None = None,
+        render_mode: str | None = None,
+        **arguments: Any,
+    ) -> None:
         if render_mode is not None:
             require_choice("render_mode", render_mode, tuple(self.metadata["render_modes"]))
-        self._simulation = Simulation(1, task_config(config, arguments))
+        steps = _steps_asked_of_gymnasium() if max_episode_steps is None else max_episode_steps
+        self._simulation = Simulation(1, task_config(config, arguments).lasting(steps))
+        self._spec: EnvSpec | None = None
         self.observation_space = self._simulation.observation_space  # type: ignore[assignment]
         self.action_space = self._simulation.action_space
         self.render_mode = render_mode
         # The ship heaves on the screen as fast as at sea.
         self.metadata = {**self.metadata, "render_fps": 1.0 / self.control_period}  # type: ignore[misc]
-        self._renderer: Renderer | None = None if render_mode is None else open_renderer(self._simulation)
+        self._renderer: Renderer | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out the renderer: a copy opens its own, whose history begins anew."""
         return {**self.__dict__, "_renderer": None}
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What makes the environment again, as plain data."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = plain_spec(spec, self._simulation.config)
 
     @property
     def simulation(self) -> Simulation:
@@ -217,11 +242,12 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
                 'as in gymnasium.make("AFrameHeave-v0", render_mode="rgb_array")'
             )
             return None
-        renderer = self._open_renderer()
+        if self._renderer is None:
+            self._renderer = open_renderer(self._simulation)
         if self.render_mode == "human":
-            renderer.show(self.metadata["render_fps"])
+            self._renderer.show(self.metadata["render_fps"])
             return None
-        return renderer.frame()
+        return self._renderer.frame()
 
     def close(self) -> None:
         """Close the window, if there is one."""
@@ -229,20 +255,31 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
             self._renderer.close()
 
     def _draw(self) -> None:
-        """Add the present to the pictures' history, and show it in render mode "human"."""
-        if self.render_mode is not None:
-            self._open_renderer().record()
-            if self.render_mode == "human":
-                self.render()
-
-    def _open_renderer(self) -> Renderer:
-        if self._renderer is None:
-            self._renderer = open_renderer(self._simulation)
-        return self._renderer
+        """Add the present to the pictures' history, if there is one yet, and show it in render mode "human"."""
+        if self._renderer is not None:
+            self._renderer.record()
+        if self.render_mode == "human":
+            self.render()
 
     def _info(self) -> dict[str, Any]:
         found = task.info(self._simulation.results.copy(), self._simulation.frames())
-        return {name: value[0] if value.ndim > 1 else value[0].item() for name, value in found.items()}
+        return {name: value[0, ...] for name, value in found.items()}
+
+
+def _steps_asked_of_gymnasium() -> int | None:
+    """``max_episode_steps`` of the ``gymnasium.make`` that constructs the environment; None: none, or no such call.
+
+    Gymnasium keeps it to itself and cuts the episode from outside, so that a longer one than ours could not be had, and
+    a load that is lost would be charged for the wrong time.
+    """
+    frame = inspect.currentframe()
+    for _ in range(2):
+        frame = frame and frame.f_back
+    if frame is None or frame.f_code is not gymnasium.make.__code__:
+        return None
+    asked = frame.f_locals["max_episode_steps"]
+    steps = frame.f_locals["env_spec"].max_episode_steps if asked is None else asked
+    return None if steps == -1 else steps
 
 
 def _scenario_option(options: dict[str, Any] | None) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -44,7 +45,7 @@ class Mesh:
         return free if self.modes is None else min(free, self.modes + STATIC_SHAPES)
 
 
-def mesh_of(model: str, rfes: tuple[int, int] | None, modes: int | None) -> Mesh | None:
+def mesh_of(model: str, rfes: Sequence[int] | None, modes: int | None) -> Mesh | None:
     """Mesh that an environment's arguments ask for; None for the simplified model, which takes none of them."""
     if model != "rfem":
         for name, value in (("rfes", rfes), ("rfem_modes", modes)):

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
 from cattrs import Converter, transform_error
 from cattrs.errors import BaseValidationError, ForbiddenExtraKeysError
 
@@ -53,11 +55,18 @@ def structure(converter: Converter, data: Any, kind: type[T], source: str) -> T:
         raise InvalidValue(f"{source}: {_first(error)}") from error
 
 
-def without_none(value: Any) -> Any:
-    """Leave out what is None, for TOML, which has no null: it reads back as the default."""
-    if isinstance(value, dict):
-        return {key: without_none(item) for key, item in value.items() if item is not None}
-    return [without_none(item) for item in value] if isinstance(value, list | tuple) else value
+def plain(value: Any) -> Any:
+    """Turn mappings, sequences, paths and numbers of NumPy into what JSON and TOML have.
+
+    What is None is left out, as TOML has no null: it reads back as the default.
+    """
+    if isinstance(value, Mapping):
+        return {key: plain(item) for key, item in value.items() if item is not None}
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, Path):
+        return str(value)
+    return [plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def _first(error: BaseException) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from numbers import Real
 from typing import Any
 
@@ -16,6 +17,10 @@ class SmallRotationWarning(UserWarning):
 
 class InvalidValue(ValueError):
     """A value outside what the model can take. The message names it, its range and its unit."""
+
+
+class UnexpectedArgument(InvalidValue, TypeError):
+    """A keyword argument that there is not; a ``TypeError`` as Python's own is, which libraries go by."""
 
 
 def _interval(low: float, high: float, low_open: bool) -> str:
@@ -67,6 +72,14 @@ def require_numbers(name: str, value: Any, unit: str) -> npt.NDArray[np.float64]
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise InvalidValue(f"{name} = {value!r}: must be an array of numbers, {unit}") from None
+
+
+def require_known(arguments: Iterable[str], known: Iterable[str]) -> None:
+    """Raise ``UnexpectedArgument`` unless every one of ``arguments`` is one of ``known``."""
+    names = sorted(known)
+    for name in arguments:
+        if name not in names:
+            raise UnexpectedArgument(f"unexpected keyword argument {name!r}: must be one of {', '.join(names)}")
 
 
 def require_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:

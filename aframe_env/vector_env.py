@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
 import numpy.typing as npt
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from aframe_env import task
-from aframe_env.config import TaskConfig, task_config
+from aframe_env.config import TaskConfig, plain_spec, task_config
 from aframe_env.env import EnvState
 from aframe_env.rendering import open_renderer
 from aframe_env.scenario import Scenario
@@ -45,7 +45,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
     def __init__(
         self,
         num_envs: int = 1,
-        config: TaskConfig | None = None,
+        config: TaskConfig | Mapping[str, Any] | None = None,
         *,
         max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
@@ -55,10 +55,6 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         require_integer("num_envs", num_envs, low=1, high=2**24)
         if render_mode is not None:
             require_choice("render_mode", render_mode, ("rgb_array",))
-        config = task_config(config, arguments)
-        if max_episode_steps is not None:
-            require_integer("max_episode_steps", max_episode_steps, low=1, high=2**31)
-            config = replace(config, episode_duration=max_episode_steps * config.control_period)
         try:
             self._autoreset = AutoresetMode(autoreset_mode)
         except ValueError:
@@ -66,7 +62,8 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
             raise InvalidValue(f"autoreset_mode = {autoreset_mode!r}: must be one of {modes}") from None
         self.num_envs = num_envs
         self.render_mode = render_mode
-        self._simulation = Simulation(num_envs, config)
+        self._simulation = Simulation(num_envs, task_config(config, arguments).lasting(max_episode_steps))
+        self._spec: EnvSpec | None = None
         self.single_observation_space = self._simulation.observation_space
         self.single_action_space = self._simulation.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -76,7 +73,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
             "render_fps": 1.0 / self._simulation.control_period,
             "autoreset_mode": self._autoreset,
         }
-        self._renderer: Renderer | None = None if render_mode is None else open_renderer(self._simulation)
+        self._renderer: Renderer | None = None
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._seeds: list[int] = [-1] * num_envs
         self._ended = np.zeros(num_envs, dtype=np.bool_)
@@ -86,6 +83,15 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
     def __getstate__(self) -> dict[str, Any]:
         """Leave out the renderer: a copy opens its own, whose history begins anew."""
         return {**self.__dict__, "_renderer": None}
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What makes the environment again, as plain data."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = plain_spec(spec, self._simulation.config)
 
     @property
     def simulation(self) -> Simulation:
@@ -195,18 +201,14 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         if self.render_mode is None:
             gymnasium.logger.warn("render() without a render mode: give one when making the environment")
             return None
-        renderer = self._open_renderer()
-        return tuple(renderer.frame(row) for row in range(self.num_envs))
-
-    def _record(self) -> None:
-        """Add the present to the pictures' history."""
-        if self.render_mode is not None:
-            self._open_renderer().record()
-
-    def _open_renderer(self) -> Renderer:
         if self._renderer is None:
             self._renderer = open_renderer(self._simulation)
-        return self._renderer
+        return tuple(self._renderer.frame(row) for row in range(self.num_envs))
+
+    def _record(self) -> None:
+        """Add the present to the pictures' history, if there is one yet."""
+        if self._renderer is not None:
+            self._renderer.record()
 
     def _generator(self, index: int) -> np.random.Generator:
         generator = self._generators[index]

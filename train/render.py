@@ -52,16 +52,17 @@ class Options:
 
 def picture(options: Options) -> npt.NDArray[np.uint8]:
     """Run the environment up to the moment and return its picture, (height, width, 3)."""
+    env: Any = gymnasium.make(
+        aframe_env.ENV_ID,
+        scenario=ScenarioDistribution(hs=options.hs, tp=(8.0, 11.0), rope_length=(150.0, 600.0)),
+        episode_duration=max(options.time, 60.0),
+        render_mode="rgb_array",
+    ).unwrapped
+    env.reset(seed=options.scenario_seed)
     try:
-        env: Any = gymnasium.make(
-            aframe_env.ENV_ID,
-            scenario=ScenarioDistribution(hs=options.hs, tp=(8.0, 11.0), rope_length=(150.0, 600.0)),
-            episode_duration=max(options.time, 60.0),
-            render_mode="rgb_array",
-        ).unwrapped
+        env.render()  # the chart begins with the first picture
     except DependencyNotInstalled as error:
         raise InvalidValue(f"train.render: {error}") from None
-    env.reset(seed=options.scenario_seed)
     steps = round(options.time / env.control_period)
     radius = env.scenario.crane.winch.drum_radius
     for step in range(steps):

@@ -13,13 +13,16 @@ if TYPE_CHECKING:
 
 
 def open_renderer(simulation: Simulation) -> Renderer:
-    """Return a renderer of the simulation's rows; raise ``DependencyNotInstalled`` where pygame is missing."""
+    """Return a renderer of the simulation's rows, whose history begins now.
+
+    Raises ``DependencyNotInstalled`` where pygame is missing.
+    """
     # A greeting on standard output at import has no place in the output of who imports us.
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     try:
         import pygame  # noqa: F401
     except ImportError as error:
-        raise DependencyNotInstalled('pygame is not installed: pip install "aframe-heave[render]"') from error
+        raise DependencyNotInstalled("render() needs pygame: pip install 'aframe-heave[render]'") from error
     from aframe_env.rendering.renderer import Renderer
 
     return Renderer(simulation)

@@ -35,6 +35,7 @@ class Renderer:
         self._canvas = Canvas(*SIZE)
         self._window: pygame.Surface | None = None
         self._clock = pygame.time.Clock()
+        self.record()
 
     def record(self) -> None:
         """Add the present to the history: to be called after every reset and step."""

@@ -49,7 +49,7 @@ from aframe_env.scenario.scenario import Scenario
 from aframe_env.scenario.sea import Sea, SeaMotion
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.scenario.vessel import Vessel
-from aframe_env.serialization import read_toml, strict_converter, structure, without_none
+from aframe_env.serialization import plain, read_toml, strict_converter, structure
 from aframe_env.validation import InvalidValue, require_choice
 
 _SECTIONS: Mapping[str, type[Section]] = {
@@ -114,6 +114,7 @@ def scenarios_of(data: Mapping[str, Any], folder: Path, source: str) -> Scenario
 def scenario_source(given: ScenarioSource | str | Path | Mapping[str, Any] | None) -> ScenarioSource:
     """Return what scenarios come from: as given, read from a file, or made of what a file would say.
 
+    In a mapping, tuples may stand for lists, and paths and NumPy's numbers are taken for what they say.
     None stands for the default distribution.
     """
     if given is None:
@@ -123,7 +124,7 @@ def scenario_source(given: ScenarioSource | str | Path | Mapping[str, Any] | Non
     if isinstance(given, str | Path):
         return read_scenarios(given)
     if isinstance(given, Mapping):
-        return scenarios_of(given, Path(), "scenario")
+        return scenarios_of(plain(given), Path(), "scenario")
     raise InvalidValue(f"scenario = {given!r}: must be a Scenario, a ScenarioDistribution, a file or a mapping")
 
 
@@ -132,14 +133,19 @@ def scenario_text(source: ScenarioSource) -> str:
 
     A vessel or a record that was not read from a file cannot be written, and raises ``InvalidValue``.
     """
+    return tomli_w.dumps(scenario_data(source))
+
+
+def scenario_data(source: ScenarioSource) -> dict[str, Any]:
+    """What that file says, as plain data of TOML or JSON; raises as ``scenario_text`` does."""
     converter = _converter(Path())
     if isinstance(source, Scenario):
-        return tomli_w.dumps(without_none(converter.unstructure(source)))
+        return dict(plain(converter.unstructure(source)))
     table = {each.name: getattr(source, each.name) for each in fields(source)}
     table["vessel"], table["deck_position"] = _vessel_name(source.vessel), list(source.vessel.deck_position)
     table["records"] = [_record_file(record) for record in source.records]
-    plain = {name: converter.unstructure(value) for name, value in table.items()}
-    return tomli_w.dumps(without_none({"kind": "distribution", **plain}))
+    data = {name: converter.unstructure(value) for name, value in table.items()}
+    return dict(plain({"kind": "distribution", **data}))
 
 
 def _converter(folder: Path) -> Converter:
@@ -186,8 +192,8 @@ def _converter(folder: Path) -> Converter:
     harmonic = converter.get_unstructure_hook(HarmonicMotion)
     converter.register_unstructure_hook(HarmonicMotion, lambda m: {"kind": "harmonic", **harmonic(m)})
     for name, cls in _SECTIONS.items():
-        plain = converter.get_unstructure_hook(cls)
-        converter.register_unstructure_hook(cls, lambda s, n=name, p=plain: {"kind": n, **p(s)})
+        section_data = converter.get_unstructure_hook(cls)
+        converter.register_unstructure_hook(cls, lambda s, n=name, data=section_data: {"kind": n, **data(s)})
     return converter
 
 

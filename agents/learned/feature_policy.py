@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -26,10 +27,13 @@ class OnFeatures(ABC):
 
     name: str
     knows: Knowledge
+    crane: Crane
+    """The crane whose winch and rope ``predict`` reckons with; the reference crane, unless you set another."""
 
     def __init__(self, name: str, config: FeatureConfig) -> None:
         self.name = name
         self.knows = Knowledge.SENSORS if config.sensors else Knowledge.STATE
+        self.crane = Crane()
         self._config = config
         self._features: Features | PlanFeatures | None = None
         self._cranes: Sequence[Crane] = ()
@@ -55,20 +59,58 @@ class OnFeatures(ABC):
             inputs = self._features.advance(observation)
         return self._features.command(self._output(inputs))
 
-    def predict(self, observation: Float32Array, *, first: bool = False, crane: Crane | None = None) -> Float32Array:
-        """Action (1,) rad/s for one observation (K,) of the environment.
+    def predict(
+        self,
+        observation: npt.NDArray[Any] | dict[str, npt.NDArray[Any]],
+        state: Any = None,
+        episode_start: npt.NDArray[Any] | bool | None = None,
+        deterministic: bool = True,
+    ) -> tuple[Float32Array, Any]:
+        """Return actions, rad/s, and the memory for the next call, as models of Stable-Baselines3 do.
 
-        ``first``: an episode's first one, with that ``crane`` (the reference crane by default).
+        ``observation``: of the environment, (K,) or (N, K); the actions are (1,) or (N, 1). ``state``: the memory that
+        the last call returned, which stays as it is; None where all rows begin an episode. ``episode_start``: rows that
+        begin one now, (N,) bool. ``deterministic`` has no effect: these policies have no spread.
         """
-        if first or self._features is None:
-            self._features, self._cranes = None, [crane or Crane()]
+        checked = self._checked(observation)
+        rows = np.atleast_2d(checked)
+        count, crane = len(rows), self.crane
+        if state is None:
+            memory = Features(count, self._config)
+            inputs = memory.start(rows, [crane] * count)
+        else:
+            if not isinstance(state, Features) or state.rows != count:
+                what = f"a memory of {state.rows}" if isinstance(state, Features) else repr(state)
+                raise InvalidValue(
+                    f"state = {what}: must be what the last predict() of {count} rows returned, or None at the start"
+                )
+            memory = deepcopy(state)
+            inputs = memory.advance(rows)
+            begun = np.flatnonzero(_starts(episode_start, count))
+            if len(begun):
+                inputs[begun] = memory.start(rows[begun], [crane] * len(begun), begun)
+        actions = memory.command(self._output(inputs)).astype(np.float32)[:, None]
+        return (actions[0] if checked.ndim == 1 else actions), memory
+
+    def _checked(self, observation: Any) -> Float32Array:
+        """The observation, (K,) or (N, K). Raises InvalidValue where it is neither."""
         quantities, name = (SENSED, "sensors") if self._config.sensors else (STATE, "state")
-        if observation.shape != (len(quantities),):
+        width = len(quantities)
+        values = require_numbers("observation", observation, f"({width},) or (N, {width})")
+        if values.ndim not in (1, 2) or values.shape[-1] != width:
             raise InvalidValue(
-                f"observation of shape {observation.shape}: must be ({len(quantities)},), "
+                f"observation of shape {values.shape}: must be ({width},) or (N, {width}), "
                 f'the environment\'s observation="{name}"'
             )
-        return self.act(observation[None], 0.0).astype(np.float32)
+        return values.astype(np.float32)
+
+
+def _starts(episode_start: Any, count: int) -> npt.NDArray[np.bool_]:
+    """Rows (N,) that begin an episode."""
+    starts = np.asarray(False if episode_start is None else episode_start, dtype=np.bool_)
+    if starts.shape not in ((), (count,)):
+        raise InvalidValue(f"episode_start of shape {starts.shape}: must be ({count},), one for each observation")
+    return np.broadcast_to(starts, count)
 
 
 class FeaturePolicy(OnFeatures):

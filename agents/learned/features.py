@@ -93,6 +93,7 @@ class Features:
     """Features of N rows for the residual and the speed action, and what their outputs ask of the winches."""
 
     def __init__(self, rows: int, config: FeatureConfig) -> None:
+        self.rows = rows
         self._action = config.action
         self.names = STATE_FEATURES if config.sensors is None else SENSED_FEATURES
         self._hoists = HoistBatch(rows, config.control_period, STATE if config.sensors is None else SENSED)

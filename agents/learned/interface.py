@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.scenario.crane import Crane
-from aframe_env.validation import InvalidValue, require_choice, require_number
+from aframe_env.validation import require_choice, require_known, require_number
 from agents.control.filters import ALL, FloatArray, Rows
 from agents.control.regulator import Observation
 from agents.learned.feature_sets import features_for
@@ -70,10 +70,7 @@ class InterfaceConfig:
 
 def interface_config(config: InterfaceConfig | None, arguments: Mapping[str, Any]) -> InterfaceConfig:
     """Return the ``config``, or the default one, but for these fields."""
-    known = InterfaceConfig.__dataclass_fields__
-    for name in arguments:
-        if name not in known:
-            raise InvalidValue(f"unknown argument {name!r}: must be one of {', '.join(sorted(known))}")
+    require_known(arguments, InterfaceConfig.__dataclass_fields__)
     return replace(config or InterfaceConfig(), **arguments)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any, TypeVar
 
 import gymnasium
@@ -57,10 +58,10 @@ class AgentInterface(
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], config: InterfaceConfig | None = None, **arguments: Any) -> None:
-        RecordConstructorArgs.__init__(self, config=config, **arguments)
         gymnasium.Wrapper.__init__(self, env)
         self._simulation = simulation = _bare(env, AFrameHeaveEnv).simulation
         self._config = interface_config(config, arguments)
+        RecordConstructorArgs.__init__(self, **asdict(self._config))
         self._features = _features(simulation, self._config)
         self._cuts = Cuts(1, simulation.control_period, simulation.episode_duration, self._config)
         self.observation_space = _observation_space(self._features)  # type: ignore[assignment]

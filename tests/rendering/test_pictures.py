@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+import subprocess
 import sys
 import warnings
 from typing import Any
@@ -199,6 +200,7 @@ def test_rgb_array_opens_no_window() -> None:
 def test_copies_draw(clone: Any) -> None:
     env = make()
     env.reset(seed=6)
+    env.render()
     frame_after(env, 20)
     other = clone(env)
     np.testing.assert_array_equal(other.render()[SIDE_VIEW], env.render()[SIDE_VIEW])
@@ -226,8 +228,53 @@ def test_wrong_render_modes() -> None:
         AFrameHeaveVectorEnv(2, render_mode="human")
 
 
-def test_missing_pygame_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_chart_begins_with_the_first_picture() -> None:
+    """What nobody looks at is not recorded."""
+    late, early = make(), make()
+    for env in (late, early):
+        env.reset(seed=6)
+    early.render()
+    frames = frame_after(late, 100), frame_after(early, 100)
+    np.testing.assert_array_equal(frames[0][SIDE_VIEW], frames[1][SIDE_VIEW])
+    columns = (frames[0][CHART] != frames[1][CHART]).any(axis=(0, 2))
+    assert columns.sum() > 100
+
+
+LEARNER = """
+import sys
+
+sys.modules["pygame"] = None
+from stable_baselines3 import PPO
+from stable_baselines3.common.env_util import make_vec_env
+
+model = PPO("MlpPolicy", "aframe_env:AFrameHeave-v0", n_steps=64, batch_size=64, n_epochs=1, device="cpu")
+assert model.get_env().render_mode == "rgb_array"
+model.learn(64)
+envs = make_vec_env("AFrameHeave-v0", n_envs=2)
+envs.reset()
+envs.step([envs.action_space.low] * 2)
+try:
+    envs.get_images()
+except Exception as error:
+    print(error)
+"""
+
+
+def test_learners_that_ask_for_pictures_they_never_look_at_need_no_pygame() -> None:
+    done = subprocess.run([sys.executable, "-c", LEARNER], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "render() needs pygame: pip install 'aframe-heave[render]'"
+
+
+@pytest.mark.parametrize("mode", ["human", "rgb_array"])
+def test_missing_pygame_names_the_extra_at_the_first_picture(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)
-    with pytest.raises(gymnasium.error.DependencyNotInstalled, match=r"aframe-heave\[render\]"):
-        make()
-    gymnasium.make("AFrameHeave-v0").close()
+    env = gymnasium.make("AFrameHeave-v0", render_mode=mode)
+    if mode == "rgb_array":
+        env.reset(seed=0)
+    with pytest.raises(gymnasium.error.DependencyNotInstalled, match=r"pip install 'aframe-heave\[render\]'"):
+        env.reset(seed=0) if mode == "human" else env.render()
+    vector = gymnasium.make_vec("AFrameHeave-v0", num_envs=2, render_mode="rgb_array")
+    vector.reset(seed=0)
+    vector.step(np.zeros((2, 1), dtype=np.float32))
+    with pytest.raises(gymnasium.error.DependencyNotInstalled, match=r"pip install 'aframe-heave\[render\]'"):
+        vector.render()

@@ -169,7 +169,10 @@ def test_scenario_option_is_the_episode() -> None:
         (lambda: AFrameHeaveEnv(scenario=1.0), "scenario = 1.0: must be a Scenario, a ScenarioDistribution, a file or"),
         (lambda: AFrameHeaveEnv(scenario="absent.toml"), "scenario = 'absent.toml': cannot be read"),
         (lambda: AFrameHeaveEnv(scenario={"kind": "sea"}), "scenario: kind = 'sea': must be one of 'scenario', "),
-        (lambda: AFrameHeaveEnv(control_step=0.1), "unknown argument 'control_step': must be one of control_period, "),
+        (
+            lambda: AFrameHeaveEnv(control_step=0.1),
+            "unexpected keyword argument 'control_step': must be one of control_period, ",
+        ),
         (lambda: AFrameHeaveEnv(render_mode="ansi"), "render_mode = 'ansi'"),
         (lambda: AFrameHeaveEnv().reset(options={"sea": 1}), "options: unknown key 'sea': must be 'scenario'"),
         (lambda: AFrameHeaveEnv().reset(options={"scenario": 1}), r"options\['scenario'\] = 1: must be a Scenario"),

@@ -11,7 +11,7 @@ import tomli_w
 import tyro
 from cattrs import Converter
 
-from aframe_env.serialization import read_toml, strict_converter, structure, without_none
+from aframe_env.serialization import plain, read_toml, strict_converter, structure
 from aframe_env.validation import InvalidValue
 
 T = TypeVar("T")
@@ -24,7 +24,7 @@ def read_options(path: Path, kind: type[T]) -> T:
 
 def to_toml(options: Any) -> str:
     """Options as TOML; what is not set is left out."""
-    return tomli_w.dumps(without_none(_converter().unstructure(options)))
+    return tomli_w.dumps(plain(_converter().unstructure(options)))
 
 
 def _converter() -> Converter:

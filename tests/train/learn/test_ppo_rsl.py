@@ -128,8 +128,9 @@ def test_a_run_from_start_to_an_agent_that_steps_the_environment(
     assert (agent.card.algorithm, agent.card.seed, agent.card.timesteps) == ("residual PPO", 3, 512)
     env = gymnasium.make("AFrameHeave-v0")
     observation, _ = env.reset(seed=0)
-    for step in range(3):
-        action = agent.predict(observation, first=step == 0)
+    memory = None
+    for _ in range(3):
+        action, memory = agent.predict(observation, memory)
         assert env.action_space.contains(action)
         observation, reward, _, _, _ = env.step(action)
         assert np.isfinite(reward)

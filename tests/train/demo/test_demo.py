@@ -1,0 +1,173 @@
+"""The live viewer: the lift that it plays, and the page in a real browser."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import socket
+import subprocess
+import sys
+from dataclasses import replace
+from threading import Thread
+
+import numpy as np
+import pytest
+
+from aframe_env import InvalidValue
+from agents.rollout import run
+from train.demo.episode import RUN_IN, Episode, Setting, between, reduction
+from train.demo.policies import build, choices
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+LAW = "feed-forward + feedback (state)"
+SETTING = Setting(policy=LAW, sensors=False, hs=3.0, tp=9.0, heading=2.6, load_mass=6e4, rope_length=500.0, seed=1)
+
+
+def test_both_lifts_are_those_of_the_rollout():
+    episode = Episode(SETTING)
+    episode.advance_to(20.0)
+    history = episode.history()
+    assert history[-1, 0] == pytest.approx(20.0)
+    for column, policy in ((1, LAW), (2, "drum still")):
+        chosen, _ = build(policy, sensors=False)
+        rolled = run(chosen, [SETTING.scenario()], episode_duration=20.0)
+        np.testing.assert_allclose(history[:, column], rolled.error[0], atol=1e-6)
+
+
+def test_between_two_steps_the_ship_moves_evenly():
+    episode = Episode(SETTING)
+    episode.advance_to(RUN_IN)
+    before, after = episode.at(RUN_IN - 0.1).driven, episode.at(RUN_IN).driven
+    middle = episode.at(RUN_IN - 0.05).driven
+    assert middle.time == pytest.approx(RUN_IN - 0.05)
+    np.testing.assert_allclose(middle.load, 0.5 * (before.load + after.load), atol=1e-9)
+    assert between(before, after, 1.0).depth_error == pytest.approx(episode.history()[-1, 1])
+    assert abs(after.deck - before.deck).max() > 1e-3
+
+
+def test_reduction_is_one_minus_the_ratio_of_rms():
+    t = np.linspace(0.0, 10.0, 101)
+    history = np.column_stack([t, 0.2 * np.sin(t), 2.0 * np.sin(t)])
+    assert reduction(history) == pytest.approx(0.9)
+    assert np.isnan(reduction(np.zeros((3, 3))))
+
+
+def test_sensors_decide_what_a_law_is_and_sees():
+    offered = {choice.name: choice for choice in choices(())}
+    law = offered["predictive control"]
+    assert build(law.text(sensors=True), True)[1] == "sensors"
+    assert build(law.text(sensors=False), False)[1] == "state"
+    noisy = replace(SETTING, policy=law.text(sensors=True), sensors=True)
+    assert Episode(noisy).on_sensors
+    assert not Episode(SETTING).on_sensors
+
+
+def test_policies_can_be_named_and_those_that_need_the_future_are_refused():
+    assert [choice.name for choice in choices([LAW, "drum-still", LAW])] == [LAW, "drum still"]
+    seeds = [f"results/agents/ppo/seed-{k}" for k in (0, 1)]
+    assert [choice.name for choice in choices(seeds)] == seeds
+    with pytest.raises(InvalidValue, match="must be one that acts as it goes"):
+        choices(["winch-limited optimum"])
+    with pytest.raises(InvalidValue, match="'nobody': must be one of"):
+        choices(["nobody"])
+
+
+def command(*options: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "train.demo", "--no-open", *options], capture_output=True, text=True, timeout=300
+    )
+
+
+def test_a_port_in_use_names_one_that_is_free():
+    pytest.importorskip("viser", reason="needs viser")
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        done = command("--port", str(port))
+    assert done.returncode == 2
+    said = re.fullmatch(rf"error: port = {port}: is in use.*: python -m train\.demo --port (\d+)\n", done.stderr)
+    assert said is not None
+    assert int(said[1]) != port
+
+
+def test_without_viser_the_extra_is_named(monkeypatch):
+    from rich.console import Console
+
+    from train.demo import __main__ as command_of
+
+    monkeypatch.setattr(command_of, "find_spec", lambda name: None)
+    with pytest.raises(Exception, match=r'pip install "aframe-heave\[demo\]"'):
+        command_of.run(command_of.Options(open=False), Console(quiet=True))
+
+
+# ---- in the browser
+
+
+@pytest.fixture(scope="module")
+def viewer():
+    pytest.importorskip("viser", reason="needs viser")
+    from train.demo.viewer import Viewer
+
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    made = Viewer("127.0.0.1", port, (LAW, "drum still"))
+    thread = Thread(target=made.play)
+    thread.start()
+    yield made
+    made.end()
+    thread.join(timeout=20.0)
+    assert not thread.is_alive()
+
+
+@pytest.fixture(scope="module")
+def page(viewer):
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+    if CHROMIUM is None:
+        pytest.skip("needs Chromium on the path")
+    flags = ["--no-first-run", "--disable-background-networking", "--disable-component-update"]
+    # Without a GPU: the renderer on the processor that Chromium brings.
+    flags += ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+    if os.geteuid() == 0:
+        flags.append("--no-sandbox")
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, args=flags)
+        # A small picture: what is tested here is not how fast a processor draws.
+        opened = browser.new_page(viewport={"width": 640, "height": 400})
+        opened.wrong = []
+        opened.on("pageerror", lambda error: opened.wrong.append(str(error)))
+        opened.asked = []
+        opened.on("request", lambda request: opened.asked.append(request.url))
+        opened.set_default_timeout(120_000)
+        opened.goto(viewer.address)
+        opened.wait_for_selector("text=heave reduction")
+        yield opened
+        browser.close()
+
+
+def figures(page):
+    """Load error and drum still, RMS, in metres, as the page says them."""
+    text = page.locator("text=/^[0-9.]+ (cm|m)$/").all_inner_texts()
+    return [float(t.split()[0]) * (0.01 if t.endswith("cm") else 1.0) for t in text[:2]]
+
+
+def test_the_page_shows_the_error_beside_the_drum_still(page):
+    driven, still = figures(page)
+    assert 0.0 < driven < 0.2 * still
+
+
+def test_a_slider_changes_the_loads_error(page):
+    before = figures(page)
+    page.get_by_role("slider").first.press("Home")  # Hs, to its least
+    page.wait_for_function(
+        "(before) => { const m = document.body.innerText.match(/([0-9.]+) cm[^]*?([0-9.]+) (cm|m)/);"
+        " return m && m[3] === 'cm' && Math.abs(m[1] - before) > 0.01 }",
+        arg=100.0 * before[0],
+    )
+    after = figures(page)
+    assert after[1] < 0.4 * before[1]
+    assert after[0] < before[0]
+
+
+def test_nothing_went_wrong_and_nothing_was_asked_elsewhere(page, viewer):
+    assert page.wrong == []
+    assert {url.split("/")[2] for url in page.asked if url.startswith(("http", "ws"))} == {viewer.address.split("/")[2]}
