@@ -106,7 +106,8 @@ class Planner:
         o = self.hoists.start(cranes, observation, rows)
         self._observer.start(o, rows)
         model, price = self.hoists.model(self._config.damping_ratio, rows), self._config.price
-        self._k[rows], self._cost_to_go[rows] = model.gains(price), model.costs_to_go(price)
+        self._cost_to_go[rows] = cost_to_go = model.costs_to_go(price)
+        self._k[rows] = model.gains_for(cost_to_go, price)
         return o
 
     def advance(self, observation: Observation) -> Columns:

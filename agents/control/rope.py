@@ -62,6 +62,10 @@ class RopeModel:
 
     def gains(self, effort: float) -> FloatArray:
         """K (N, 4) of the feedback c = -K z with the least Σ e² + ``effort`` c² (linear-quadratic regulator)."""
-        pb = (self.costs_to_go(effort) @ self.b[:, :, None])[:, :, 0]
+        return self.gains_for(self.costs_to_go(effort), effort)
+
+    def gains_for(self, cost_to_go: FloatArray, effort: float) -> FloatArray:
+        """The same, from the ``costs_to_go`` (N, 4, 4) of that effort."""
+        pb = (cost_to_go @ self.b[:, :, None])[:, :, 0]
         k = (pb[:, None, :] @ self.a)[:, 0, :]
         return np.asarray(k / (effort + (pb * self.b).sum(axis=1))[:, None])

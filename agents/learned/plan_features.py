@@ -1,7 +1,8 @@
 """Features of the agents that correct predictive control: the plan, what it asks of the winch, and the waves to come.
 
 The network's output is added to the plan's first change of the drum's speed, as a share of what the winch can gain or
-lose in a control step; with an output of zero the drum does what predictive control plans.
+lose in a control step, and the more so the nearer to its limits the winch will come: where it stays far from them,
+predictive control has little left to gain. With an output of zero the drum does what predictive control plans.
 """
 
 from __future__ import annotations
@@ -28,6 +29,10 @@ EXPECTED: Final = (5, 10, 20, 30, 45)
 """Those whose expected depth error is one."""
 DEMANDED: Final = (2, 10, 25, 49)
 """Those up to which the greatest demand on the winch is one."""
+
+FAR_FROM_LIMITS: Final = 0.6
+"""Greatest demand on the winch within the horizon, as a share of its limits, below which outputs move nothing; they
+have their full weight from 1 on."""
 
 PLAN_FEATURES: Final = (
     "depth_error",
@@ -76,7 +81,7 @@ class PlanFeatures:
 
     def command(self, output: FloatArray) -> FloatArray:
         """Drum speed commands (N,) rad/s for a network's output (N,), in [-1, 1]."""
-        corrected = np.clip(self._planned + np.clip(output, -1.0, 1.0), -1.0, 1.0)
+        corrected = np.clip(self._planned + self._weight * np.clip(output, -1.0, 1.0), -1.0, 1.0)
         # Untouched where nothing is added: a plan may ask for more than the winch gives.
         return self._planner.command(self._rope_speed + 0.5 * self._gain * (corrected - self._planned))
 
@@ -91,6 +96,8 @@ class PlanFeatures:
         self._gain = hoists.period * acceleration
         self._rope_speed = plan.rope_speed
         self._planned = np.clip(2.0 * (plan.rope_speed - drum_speed) / self._gain, -1.0, 1.0)
+        demand = np.maximum(plan.acceleration_demand, plan.speed_demand).max(axis=1)
+        self._weight = np.clip((demand - FAR_FROM_LIMITS) / (1.0 - FAR_FROM_LIMITS), 0.0, 1.0)
         regulated = 2.0 * (plan.regulated_rope_speed - drum_speed) / self._gain
         later = plan.drum_change[:, PLANNED] / self._gain[:, None]
         features = (
