@@ -76,11 +76,12 @@ class OnFeatures(ABC):
         rows = np.atleast_2d(checked)
         count, crane = len(rows), self.crane
         if state is None:
-            memory = Features(count, self._config)
+            memory = features_for(count, self._config)
             inputs = memory.start(rows, [crane] * count)
         else:
-            if not isinstance(state, Features) or state.rows != count:
-                what = f"a memory of {state.rows}" if isinstance(state, Features) else repr(state)
+            known = isinstance(state, Features | PlanFeatures)
+            if not known or state.rows != count:
+                what = f"a memory of {state.rows}" if known else repr(state)
                 raise InvalidValue(
                     f"state = {what}: must be what the last predict() of {count} rows returned, or None at the start"
                 )

@@ -66,6 +66,7 @@ class PlanFeatures:
     names = PLAN_FEATURES
 
     def __init__(self, rows: int, config: FeatureConfig) -> None:
+        self.rows = rows
         self._planner = Planner(rows, config.control_period, PlanningConfig(sensors=config.sensors, waves=config.waves))
         self._heave, self._length, self._turn, self._planned = np.zeros((4, rows))
 

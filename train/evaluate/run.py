@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, ClassVar, Final, Literal
+from typing import ClassVar, Final, Literal
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -156,14 +156,14 @@ def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console) ->
     return Comparison(tuple(entries), tuple(scenarios), config)
 
 
-def observation_of(policy: Policy, config: TaskConfig) -> task.Observation | Mapping[str, Any]:
+def observation_of(policy: Policy, config: TaskConfig) -> task.Observation:
     """Observation that a policy acts on: by its knowledge, or else the task's own."""
-    seen: dict[Knowledge, task.Observation | Mapping[str, Any]] = {
+    seen: dict[Knowledge, task.Observation] = {
         Knowledge.STATE: "state",
         Knowledge.FUTURE: "state",
         Knowledge.SENSORS: "sensors",
     }
-    return seen.get(policy.knows, config.observation)
+    return seen.get(policy.knows, config.sensors or "state")
 
 
 def write(folder: Path, comparison: Comparison, console: Console) -> None:
