@@ -65,6 +65,8 @@ class LearningOptions(RunOptions):
     known."""
     threads: int = 1
     """Threads of torch; more than one only slows so small a network down."""
+    log: tuple[str, ...] = ("tensorboard",)
+    """Where figures go beside the CSV file: tensorboard, wandb, mlflow, or several of them."""
 
     def __post_init__(self) -> None:
         require_integer("timesteps", self.timesteps, low=1, high=10**12)

@@ -11,16 +11,16 @@ from typing import Final
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import configure
 
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, serialise
 from agents.learned.feature_sets import feature_names
 from agents.learned.features import Action
 from train.evaluate.run import evaluate
 from train.learn.learner import Learner, LearnerSpec, Rows
+from train.learn.logs import open_logger, require_logs
 from train.learn.options import LearningOptions
 from train.learn.registry import find_learner
-from train.shared.cli import parse
+from train.shared.cli import parse, to_mapping
 from train.shared.run_folder import open_run, user_errors, versions, write_atomically, write_json, write_text
 
 AGENT_NAMES: Final[dict[Action, str]] = {
@@ -101,6 +101,7 @@ def main(name: str) -> int:
 def train(spec: LearnerSpec, options: LearningOptions, console: Console) -> int:
     """Train, save and compare the agents of all seeds; return the exit status."""
     spec.check(options)
+    require_logs(options.log)
     if options.seeds == 1:
         return _train_one(spec, options, console)
     folder = open_run(options, spec.command).folder
@@ -120,23 +121,22 @@ def _train_one(spec: LearnerSpec, options: LearningOptions, console: Console) ->
         learner = spec.build(options)
         learner.rows.reset()
     model = learner.model
-    model.set_logger(configure(str(folder / "log"), ["tensorboard", "csv"]))
     begin = time.perf_counter()
     interrupted = False
-    with Progress(
+    progress = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("heave reduction {task.fields[reduction]}"),
         TimeRemainingColumn(),
         console=console,
-    ) as progress:
+    )
+    with open_logger(folder, options.log, to_mapping(options)) as logger, progress:
+        model.set_logger(logger)
         try:
             model.learn(options.timesteps, callback=ShowReduction(progress, options.timesteps, learner.rows))
         except KeyboardInterrupt:
             interrupted = True
-        finally:
-            model.logger.close()
     seconds = time.perf_counter() - begin
     policy, weights = to_policy(learner, options)
     save(folder, policy, weights)

@@ -22,9 +22,15 @@ def read_options(path: Path, kind: type[T]) -> T:
     return structure(_converter(), read_toml(path, "config"), kind, str(path))
 
 
+def to_mapping(options: Any) -> dict[str, Any]:
+    """Options by name, as plain values; what is not set is left out."""
+    mapping: dict[str, Any] = plain(_converter().unstructure(options))
+    return mapping
+
+
 def to_toml(options: Any) -> str:
     """Options as TOML; what is not set is left out."""
-    return tomli_w.dumps(plain(_converter().unstructure(options)))
+    return tomli_w.dumps(to_mapping(options))
 
 
 def _converter() -> Converter:
