@@ -15,7 +15,7 @@ from aframe_env.rendering.history import History
 from aframe_env.rendering.instruments import draw_instruments
 from aframe_env.rendering.load import draw_magnified
 from aframe_env.rendering.scene import scene_of
-from aframe_env.rendering.side_view import SCALE, draw_side_view
+from aframe_env.rendering.side_view import draw_side_view, scale_of
 from aframe_env.simulation import Simulation
 
 SIZE: Final = (960, 640)
@@ -72,7 +72,7 @@ class Renderer:
         left, bottom = _MAGNIFIED[0], _MAGNIFIED[1] + _MAGNIFIED[3]
         lens = [(x + 18.0, y - 9.0), (left, bottom - 74.0), (left, bottom - 6.0), (x + 18.0, y + 9.0)]
         canvas.polygon(lens, palette.FAR_WATER, opacity=0.45)
-        draw_magnified(canvas, _MAGNIFIED, SCALE, scene, history)
+        draw_magnified(canvas, _MAGNIFIED, scale_of(scene), scene, history)
         draw_instruments(canvas, _INSTRUMENTS, scene)
         draw_chart(canvas, _CHART, scene.time, history)
         return canvas.picture()

@@ -15,11 +15,15 @@ from aframe_env.rendering.scene import Scene
 from aframe_env.rendering.ship import draw_frame_and_drum, draw_ship
 from aframe_env.rendering.view import FloatArray, View
 
-SCALE: Final = 11.0
-"""Pixels per metre."""
+_SCALE: Final = 11.0
+"""Greatest scale, pixels per metre; a crane that would stand out of the picture has a smaller one."""
 _RECESSION: Final = (0.30, 0.15)
-_AFT, _ABOVE = 14.5, 17.0
-"""Extent of the view aft of the deck's origin and above it, m."""
+_AFT, _ABOVE = 160.0, 187.0
+"""Extent of the view aft of the deck's origin and above it, pixels."""
+_HEAVE: Final = 2.5
+"""Heave of the pulley that there is room for, m; with more of it the words stay at the picture's edge."""
+_WORDS: Final = (100.0, 34.0)
+"""Room for the words beside and above the pulley, pixels."""
 _BELOW: Final = 92.0
 """Height of the part about the load, pixels."""
 _GAP: Final = 18.0
@@ -31,7 +35,7 @@ _NEAR, _FAR = -11.0, 16.0
 def draw_side_view(canvas: Canvas, box: Box, scene: Scene) -> tuple[float, float]:
     """Draw the side view; return the pixel about which the load is seen."""
     left, top, width, height = box
-    view = View((left + width - SCALE * _AFT, top + SCALE * _ABOVE), SCALE, _RECESSION)
+    view = View((left + width - _AFT, top + _ABOVE), scale_of(scene), _RECESSION)
     upper = (left, top, width, height - _BELOW)
     with canvas.within(upper):
         canvas.gradient(upper, palette.SKY_TOP, palette.SKY_LOW)
@@ -44,7 +48,7 @@ def draw_side_view(canvas: Canvas, box: Box, scene: Scene) -> tuple[float, float
             (left, darker, width, top + upper[3] - darker), palette.DEEP_WATER, palette.DEEP_WATER, (0.0, 0.8)
         )
         draw_hoist(canvas, view, scene)
-        _draw_pulley_heave(canvas, view, scene)
+        _draw_pulley_heave(canvas, view, upper, scene)
         cut = top + upper[3]
         draw_hanging(canvas, view.pixels(scene.pulley), _on_rope(view, scene, cut), scene)
     lower = (left, top + upper[3], width, _BELOW)
@@ -55,6 +59,12 @@ def draw_side_view(canvas: Canvas, box: Box, scene: Scene) -> tuple[float, float
         draw_gap(canvas, gap, _on_rope(view, scene, cut)[0], float(place[0]), scene)
     _draw_captions(canvas, left, top, scene)
     return float(place[0]), float(place[1])
+
+
+def scale_of(scene: Scene) -> float:
+    """Scale of the side view, pixels per metre: the pulley and the words beside it are within the picture."""
+    x, _, z = scene.crane.pulley_position
+    return min(_SCALE, (_AFT - _WORDS[0]) / max(x, 1.0), (_ABOVE - _WORDS[1]) / (max(z, 1.0) + _HEAVE))
 
 
 def _draw_water(canvas: Canvas, view: View, box: Box, scene: Scene, y: float, colour: Colour, opacity: float) -> None:
@@ -75,15 +85,17 @@ def _on_rope(view: View, scene: Scene, height: float) -> FloatArray:
     return np.asarray(pulley + (load - pulley) * (height - pulley[1]) / (load[1] - pulley[1]))
 
 
-def _draw_pulley_heave(canvas: Canvas, view: View, scene: Scene) -> None:
+def _draw_pulley_heave(canvas: Canvas, view: View, box: Box, scene: Scene) -> None:
     x, y = view.pixels(scene.pulley)
     rest = float(view.pixels([0.0, 0.0, scene.crane.pulley_position[2]])[1])
     canvas.dashes((x + 8.0, rest), (x + 62.0, rest), palette.FADED, 1.0, 3.0)
     canvas.line([(x + 8.0, y), (x + 26.0, y)], palette.INK, 1.2)
     if abs(rest - y) > 3.0:
         canvas.line([(x + 20.0, rest), (x + 20.0, y)], palette.INK, 1.6)
-    canvas.text("heave", (x + 36.0, min(y, rest) - 22.0), size=10)
-    canvas.text(f"{scene.pulley_heave:+.2f} m", (x + 36.0, min(y, rest) - 9.0), size=11, bold=True)
+    left, top, width, _ = box
+    words = min(x + 36.0, left + width - 64.0), max(min(y, rest) - 9.0, top + 22.0)
+    canvas.text("heave", (words[0], words[1] - 13.0), size=10)
+    canvas.text(f"{scene.pulley_heave:+.2f} m", words, size=11, bold=True)
 
 
 def _draw_depth(canvas: Canvas, box: Box, view: View, scene: Scene) -> FloatArray:
@@ -92,7 +104,7 @@ def _draw_depth(canvas: Canvas, box: Box, view: View, scene: Scene) -> FloatArra
     canvas.gradient(box, palette.DEEP_WATER, (4, 22, 38))
     target = top + 0.56 * height
     reach = 0.5 * height - 16.0
-    error = max(-reach, min(SCALE * scene.depth_error, reach))
+    error = max(-reach, min(view.scale * scene.depth_error, reach))
     x = min(max(float(view.pixels(scene.load)[0]), left + 24.0), left + width - 24.0)
     place = np.array([x, target - error])
     canvas.dashes((left, target), (left + width, target), palette.TARGET, 1.2)

@@ -16,7 +16,8 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import RenderCollection
 
 from aframe_env import Crane, Harmonic, HarmonicMotion, InvalidValue, Rope, Scenario
-from aframe_env.rendering.palette import LOAD, WARNING
+from aframe_env.rendering.palette import INK, LOAD, WARNING
+from aframe_env.scenario import Frame
 
 STILL = np.zeros(1, dtype=np.float32)
 SIDE_VIEW, INSTRUMENTS, MAGNIFIED, CHART = (
@@ -194,6 +195,24 @@ def test_rgb_array_opens_no_window() -> None:
     env.reset(seed=0)
     env.render()
     assert not pygame.display.get_init()
+
+
+@pytest.mark.parametrize("frame", [{}, {"height": 40.0}, {"height": 15.0, "luffing_angle": 1.2}])
+@pytest.mark.parametrize("amplitude", [0.0, 6.0])
+def test_pulley_and_heave_are_in_the_picture_however_large_the_crane(frame: dict[str, float], amplitude: float) -> None:
+    heave = Harmonic(coordinate="heave", amplitude=amplitude, period=12.0)
+    crane = Crane(frame=Frame(**frame))
+    env = make(scenario=Scenario(crane=crane, motion=HarmonicMotion(harmonics=(heave,))))
+    env.reset(seed=0)
+    shown = frame_after(env, 30)[SIDE_VIEW]
+    # At the right edge nothing but the heave's words is written in ink.
+    places = pixels_of(shown[:200, -66:], INK)
+    assert len(places) > 20
+    assert places[:, 0].min() >= 3
+    assert places[:, 1].max() < 66 - 3
+    if not amplitude:
+        yellow = (np.abs(shown.astype(int) - (245, 184, 46)).sum(axis=-1) < 12).nonzero()[0]
+        assert yellow.min() > 20
 
 
 @pytest.mark.parametrize("clone", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
