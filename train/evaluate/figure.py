@@ -26,11 +26,13 @@ COLOURS = tuple(to_hex(colour) for colour in _PALETTE if len(set(colour[:3])) > 
 TICKS: Final = (1.0, 0.5, 0.2, 0.1, 0.03, 0.01, 0.003, 0.001, 0.0003)
 """What is left, where reductions are labelled: from 0 to 90 % is as far as from 90 to 99 %."""
 LEAST: Final = 1e-4
+WINDOW: Final = 10.0
+"""Time over which one scenario's error is averaged, s: about a wave."""
 _ALL: Final = Interval(1.0, 1.0, 1.0)
 
 
 def comparison_figure(path: Path, entries: Sequence[Entry], still: Episodes, families: Sequence[Row]) -> None:
-    """Draw the share of scenarios above a heave reduction, one scenario's error, and each policy's mean and tail.
+    """Draw the share of scenarios above a heave reduction, one scenario's running error, and each mean and tail.
 
     Of agents that differ in their seed alone the first is shown, and the others' profiles as thin lines of its colour.
     """
@@ -76,7 +78,7 @@ def _draw_profiles(axis: Axes, entries: Sequence[Entry], still: Episodes, colour
 def _draw_history(
     axis: Axes, entries: Sequence[Entry], still: Episodes, families: Sequence[Row], colour: Mapping[str, str]
 ) -> None:
-    """Draw the depth error of one scenario: the drum still, and the best in the mean of each knowledge."""
+    """Draw how one scenario's error grows and falls: the drum still, and the best in the mean of each knowledge."""
     best: dict[str, Row] = {}
     for row in families[1:]:
         if row.scenarios == len(still.rms) and (row.knows not in best or row.mean.value > best[row.knows].mean.value):
@@ -87,17 +89,21 @@ def _draw_history(
     ]
     example = int(np.argsort(still.rms)[len(still.rms) // 2])
     for entry in chosen:
-        error = abs(entry.episodes.error[example]) + 1e-4
-        times = np.linspace(0.0, entry.episodes.duration, len(error))
+        episodes = entry.episodes
+        window = min(round(WINDOW / episodes.control_period), episodes.error.shape[1])
+        square = episodes.error[example].astype(np.float64) ** 2
+        # The error itself passes through nothing twice a wave: on a logarithmic axis a thicket of spikes.
+        running = np.sqrt(np.convolve(square, np.full(window, 1.0 / window), mode="valid"))
+        times = episodes.control_period * (np.arange(len(running)) + 0.5 * (window - 1))
         line = _style(entry.knows.value)
-        axis.plot(times, error, line, color=colour[family(entry.policy)], lw=1.2, label=entry.policy)
+        shown = np.maximum(running, LEAST)
+        axis.plot(times, shown, line, color=colour[family(entry.policy)], lw=1.8, label=entry.policy)
     axis.set_yscale("log")
-    axis.set_ylim(5e-4, None)
     axis.set_xlim(0.0, still.duration)
     axis.set_xlabel("time, s")
-    axis.set_ylabel("|depth error|, m")
+    axis.set_ylabel(f"RMS depth error over {WINDOW:g} s, m")
     axis.grid(alpha=0.3)
-    axis.legend(fontsize=8, loc="lower center", ncols=2)
+    axis.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=3, frameon=False)
     axis.set_title(f"Scenario {example}, the median sea: the best of each knowledge", fontsize=11)
 
 
