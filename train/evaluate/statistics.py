@@ -145,14 +145,18 @@ def compare_families(
     entries: Sequence[Entry], still: Episodes, optimum: Episodes | None = None, saturating: Mask | None = None
 ) -> list[Row]:
     """Figures of every policy, agents that differ in their seed alone together."""
-    families: dict[str, list[Entry]] = {}
+    return [_row(name, members, still, optimum, saturating) for name, members in families(entries)]
+
+
+def families(entries: Sequence[Entry]) -> list[tuple[str, tuple[Entry, ...]]]:
+    """Policies with their names, agents that differ in their seed alone together."""
+    found: dict[str, list[Entry]] = {}
     for entry in entries:
-        families.setdefault(family(entry.policy), []).append(entry)
-    rows = []
-    for name, members in families.items():
-        shown = f"{name}, {len(members)} seeds" if len(members) > 1 else members[0].policy
-        rows.append(_row(shown, members, still, optimum, saturating))
-    return rows
+        found.setdefault(family(entry.policy), []).append(entry)
+    return [
+        (f"{name}, {len(members)} seeds" if len(members) > 1 else members[0].policy, tuple(members))
+        for name, members in found.items()
+    ]
 
 
 def family(policy: str) -> str:

@@ -376,14 +376,18 @@ def test_the_scenarios_can_be_those_in_common(browser, section):
 
 
 @pytest.mark.parametrize("section", ["profiles", "dependence", "histories", "spectra"])
-def test_every_policy_can_be_ticked(browser, section):
-    names = browser.page.locator(f"#{section} .chip")
-    assert names.count() == 3
+def test_every_policy_can_be_ticked_for_all_pictures_at_once(browser, section):
+    summary, chips = browser.page.locator("#policies summary"), browser.page.locator("#policies .chip")
+    assert chips.count() == 3
+    summary.click()
     for i in range(3):
         for _ in range(2):
-            assert browser.changes(section, names.nth(i).click)
+            assert browser.changes(section, chips.nth(i).click)
     for word in ("none", "all"):
-        assert browser.changes(section, browser.page.locator(f"#{section} .chips button", has_text=word).click)
+        assert browser.changes(section, browser.page.locator("#policies .chips button", has_text=word).click)
+    summary.click()
+    names = ["drum still", "feed-forward + feedback (state)", "inverse <dynamics>"]
+    assert browser.page.locator("#shown > span").all_inner_texts() == names
 
 
 def test_every_reference_can_be_picked(browser):
@@ -403,8 +407,8 @@ def test_every_scenario_can_be_picked(browser, comparison):
         assert browser.changes("histories", lambda i=i: picker.select_option(str(i)))
         assert f"Scenario {examples[i].scenario}:" in browser.page.locator("#scenario-traits").inner_text()
         here = {history.policy for history in examples[i].histories}
-        boxes = browser.page.locator("#histories .chip input")
-        assert {k for k in range(3) if boxes.nth(k).is_enabled()} == here
+        words = browser.page.locator("#histories .legend small").all_inner_texts()
+        assert len([word for word in words if word != "did not run"]) == len(here)
 
 
 def test_every_policys_worst_can_be_picked(browser, comparison):
@@ -435,6 +439,72 @@ def test_light_and_dark(browser):
 def test_after_all_that_nothing_went_wrong(browser, page):
     assert browser.wrong == []
     assert browser.asked == [page.as_uri()]
+
+
+@pytest.fixture(scope="module")
+def seeds():
+    """Two seeds of an agent, which leave a tenth and two tenths of the heave, beside a law that leaves a half."""
+    still = episodes(np.outer(np.linspace(1.0, 2.0, 40), np.sin(TIME)))
+    found = compared(still, *((Knowledge.SENSORS, episodes(share * still.error)) for share in (0.1, 0.5, 0.2)))
+    names = ("drum still", "agent, seed 0", "law", "agent, seed 1")
+    entries = [replace(entry, policy=name) for entry, name in zip(found.entries, names, strict=True)]
+    return replace(found, entries=tuple(entries))
+
+
+def test_seeds_of_an_agent_are_one_policy_with_its_spread_and_each_by_itself(seeds):
+    shown = content(seeds)
+    assert [(p.name, p.family, p.seeds) for p in shown.policies] == [
+        ("drum still", 0, [0]),
+        ("agent, 2 seeds", 1, [2, 3]),
+        ("agent, seed 0", 1, [2]),
+        ("agent, seed 1", 1, [3]),
+        ("law", 4, [4]),
+    ]
+    figures = [row.reduction for row in shown.subsets[0].figures]
+    assert [f.value for f in figures] == pytest.approx([0.0, 0.85, 0.9, 0.8, 0.5], abs=1e-6)
+    # Resampled seeds: both the first, or both the second.
+    assert (figures[1].low, figures[1].high) == pytest.approx((0.8, 0.9), abs=1e-6)
+    assert shown.reference == 1
+    assert [len(p.x) for p in shown.subsets[0].profiles] == [40, 80, 40, 40, 40]
+    assert shown.clouds[1].left == pytest.approx([0.15] * 40, rel=1e-3)
+    # The geometric mean of 0.1 and 0.2 over 0.5.
+    assert shown.pairs[4][1].ratio.value == pytest.approx(np.sqrt(0.02) / 0.5, rel=1e-5)
+    assert shown.pairs[1][4].ratio.value == pytest.approx(0.5 / np.sqrt(0.02), rel=1e-5)
+    assert {h.policy for h in shown.examples[0].histories} == {0, 2, 3, 4}
+    assert [len(found) > 0 for found in shown.worst] == [False, False, True, True, True]
+
+
+def test_a_row_of_seeds_opens(chromium, seeds, tmp_path):
+    path = tmp_path / "report.html"
+    write_report(path, seeds, COMMAND)
+    context = chromium.new_context(offline=True, viewport={"width": 1400, "height": 900})
+    opened = Browser(context, path)
+    rows, button = opened.page.locator("#table tbody tr:not(.group):visible > th"), opened.page.locator("#table .open")
+    closed = [name.strip() for name in rows.all_inner_texts()]
+    assert closed == ["agent, 2 seeds", "law", "drum still"]
+    for section in ("table", "profiles", "pairs", "dependence", "histories", "spectra"):
+        assert opened.changes(section, button.click), section
+    button.click()
+    assert [name.strip() for name in rows.all_inner_texts()] == [
+        closed[0],
+        "agent, seed 0",
+        "agent, seed 1",
+        *closed[1:],
+    ]
+    assert button.get_attribute("aria-expanded") == "true"
+    assert opened.wrong == []
+    context.close()
+
+
+@pytest.mark.parametrize("width", [1400, 1280])
+def test_the_table_is_not_cut_on_a_screen(chromium, seeds, page, width, tmp_path):
+    path = tmp_path / "report.html"
+    write_report(path, seeds, COMMAND)
+    context = chromium.new_context(offline=True, viewport={"width": width, "height": 900})
+    for shown in (page, path):
+        table = Browser(context, shown).page.locator("#table .scroll")
+        assert table.evaluate("element => element.scrollWidth <= element.clientWidth")
+    context.close()
 
 
 def test_a_phone_needs_no_sideways_scrolling(chromium, page):

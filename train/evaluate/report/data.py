@@ -16,7 +16,7 @@ from agents.rollout import Episodes
 from train.evaluate.episode_table import Traits
 from train.evaluate.report.remarks import Field, intact, remarks
 from train.evaluate.run import Comparison
-from train.evaluate.statistics import Entry, Interval, Row, compare, reductions
+from train.evaluate.statistics import Entry, Interval, Row, compare, compare_families, families, reductions
 
 Numbers = list[float]
 
@@ -53,12 +53,16 @@ TRAITS: Final = {
 
 @dataclass(frozen=True)
 class PolicyCard:
-    """A policy: who it is, what it knows, in how many of the scenarios it ran."""
+    """A policy, or agents that differ in their seed alone: who, what it knows, in how many of the scenarios it ran."""
 
     name: str
     knows: str
     privileged: bool
     scenarios: int
+    family: int
+    """Place of the agents that it is one seed of; of all others, their own."""
+    seeds: list[int]
+    """Places of its seeds; of a single policy, its own."""
 
 
 @dataclass(frozen=True)
@@ -160,12 +164,42 @@ class Episode:
 
 
 @dataclass(frozen=True)
+class _Unit:
+    """What has a place in the report: a policy, or several agents that differ in their seed alone."""
+
+    name: str
+    members: tuple[Entry, ...]
+
+    @property
+    def episodes(self) -> tuple[Episodes, ...]:
+        return tuple(member.episodes for member in self.members)
+
+    def left(self, still: Episodes) -> FloatArray:
+        """Share of the heave that is left in each scenario (seeds, N)."""
+        return np.stack([1.0 - reductions(member, still) for member in self.members])
+
+
+def _units(entries: Sequence[Entry]) -> tuple[list[_Unit], list[int]]:
+    """Agents of several seeds, each before its seeds, and all other policies; the place of each one's family."""
+    units: list[_Unit] = []
+    family: list[int] = []
+    for name, members in families(entries):
+        place = len(units)
+        units.append(_Unit(name, members))
+        if len(members) > 1:
+            units += [_Unit(member.policy, (member,)) for member in members]
+        family += [place] * (len(units) - place)
+    return units, family
+
+
+@dataclass(frozen=True)
 class Content:
     """All that the page shows."""
 
     control_period: float
     """s."""
     policies: list[PolicyCard]
+    """Agents of several seeds are there together, each before its seeds one by one."""
     reference: int
     """The policy that the page looks at first: the best of those that do not know the future."""
     featured: list[int]
@@ -182,45 +216,57 @@ class Content:
 
 def content(comparison: Comparison) -> Content:
     """Gather what the report shows."""
-    entries = comparison.entries
-    left = [1.0 - reductions(entry, comparison.still) for entry in entries]
-    reference = _reference(entries, left)
+    units, family = _units(comparison.entries)
+    left = [unit.left(comparison.still) for unit in units]
+    means = [values.mean(axis=0) for values in left]
+    top = sorted(set(family))
+    reference = _reference(units, means, top)
     field = Field.of(comparison)
     return Content(
         control_period=comparison.still.control_period,
         policies=[
-            PolicyCard(entry.policy, entry.knows.value, entry.knows is Knowledge.FUTURE, len(values))
-            for entry, values in zip(entries, left, strict=True)
+            PolicyCard(
+                name=unit.name,
+                knows=unit.members[0].knows.value,
+                privileged=unit.members[0].knows is Knowledge.FUTURE,
+                scenarios=len(means[place]),
+                family=family[place],
+                seeds=[place] if len(unit.members) == 1 else list(range(place + 1, place + 1 + len(unit.members))),
+            )
+            for place, unit in enumerate(units)
         ],
         reference=reference,
-        featured=_featured(entries, left),
-        subsets=_subsets(comparison),
-        pairs=_pairs(entries),
-        clouds=[_cloud(values) for values in left],
-        dependences=_dependences(field.traits, left),
+        featured=_featured(units, means, top),
+        subsets=_subsets(comparison, units),
+        pairs=_pairs(units),
+        clouds=[_cloud(values) for values in means],
+        dependences=_dependences(field.traits, means),
         examples=[
-            _example(comparison, field, index, label) for index, label in choose_examples(left, reference).items()
+            _example(comparison, units, field, index, label)
+            for index, label in choose_examples(means, reference).items()
         ],
         worst=[
-            [] if entry is entries[0] else [_episode(comparison, field, entry, index) for index in worst(values)]
-            for entry, values in zip(entries, left, strict=True)
+            [_episode(comparison, field, unit.members[0], index) for index in worst(values)]
+            if len(unit.members) == 1 and place
+            else []
+            for place, (unit, values) in enumerate(zip(units, means, strict=True))
         ],
     )
 
 
-def _reference(entries: Sequence[Entry], left: list[FloatArray]) -> int:
-    fair = [i for i, entry in enumerate(entries) if entry.knows is not Knowledge.FUTURE]
+def _reference(units: Sequence[_Unit], left: list[FloatArray], places: Sequence[int]) -> int:
+    fair = [i for i in places if units[i].members[0].knows is not Knowledge.FUTURE]
     return min(fair, key=lambda i: float(np.median(left[i])))
 
 
-def _featured(entries: Sequence[Entry], left: list[FloatArray]) -> list[int]:
+def _featured(units: Sequence[_Unit], left: list[FloatArray], places: Sequence[int]) -> list[int]:
     medians, most = [float(np.median(values)) for values in left], len(left[0])
     best: dict[Knowledge, int] = {}
-    for i in sorted(range(len(entries)), key=lambda i: (len(left[i]) < most, medians[i])):
+    for i in sorted(places, key=lambda i: (len(left[i]) < most, medians[i])):
         # One that removes next to nothing would only hide the drum still.
         if medians[i] < REMOVES_NOTHING:
-            best.setdefault(entries[i].knows, i)
-    return sorted({0, min(1, len(entries) - 1), *best.values()})
+            best.setdefault(units[i].members[0].knows, i)
+    return sorted({0, min(1, len(units) - 1), *best.values()})
 
 
 def numbers(values: npt.ArrayLike, digits: int = 4) -> Numbers:
@@ -240,26 +286,36 @@ def _thinned(count: int) -> npt.NDArray[np.int64]:
     return np.unique(np.linspace(0, count - 1, min(count, MOST_POINTS)).round().astype(np.int64))
 
 
-def _subsets(comparison: Comparison) -> list[Subset]:
-    entries = comparison.entries
-    counts = {len(entry.episodes.omega1) for entry in entries}
+def _subsets(comparison: Comparison, units: Sequence[_Unit]) -> list[Subset]:
+    counts = {len(entry.episodes.omega1) for entry in comparison.entries}
     most, fewest = max(counts), min(counts)
     if most == fewest:
-        return [_subset(f"all {most}", entries, comparison.rows)]
-    shared = [replace(entry, episodes=_first(entry.episodes, fewest)) for entry in entries]
+        return [_subset(f"all {most}", units, comparison.still, comparison.families, comparison.rows)]
+    entries = [replace(entry, episodes=_first(entry.episodes, fewest)) for entry in comparison.entries]
+    still = entries[0].episodes
     return [
-        _subset(f"each policy's own, {fewest} to {most}", entries, comparison.rows),
-        _subset(f"the first {fewest}, in which every policy ran", shared, compare(shared, shared[0].episodes)),
+        _subset(
+            f"each policy's own, {fewest} to {most}", units, comparison.still, comparison.families, comparison.rows
+        ),
+        _subset(
+            f"the first {fewest}, in which every policy ran",
+            _units(entries)[0],
+            still,
+            compare_families(entries, still),
+            compare(entries, still),
+        ),
     ]
 
 
-def _subset(label: str, entries: Sequence[Entry], figures: list[Row]) -> Subset:
-    still = entries[0].episodes
+def _subset(
+    label: str, units: Sequence[_Unit], still: Episodes, together: Sequence[Row], each: Sequence[Row]
+) -> Subset:
+    figures = {row.policy: row for row in (*each, *together)}
     return Subset(
         label=label,
-        figures=figures,
-        profiles=[_profile(1.0 - reductions(entry, still)) for entry in entries],
-        spectra=[_spectrum(entry.episodes.error, still.control_period) for entry in entries],
+        figures=[figures[unit.name] for unit in units],
+        profiles=[_profile(unit.left(still).ravel()) for unit in units],
+        spectra=[_spectrum(np.concatenate([e.error for e in unit.episodes]), still.control_period) for unit in units],
     )
 
 
@@ -279,25 +335,29 @@ def _spectrum(error: npt.NDArray[np.float32], control_period: float) -> Curve:
     return Curve(significant(frequency[1:]), significant(np.median(density, axis=0)[1:]))
 
 
-def _pairs(entries: Sequence[Entry]) -> list[list[Pair | None]]:
-    count = len(entries)
+def _pairs(units: Sequence[_Unit]) -> list[list[Pair | None]]:
+    count = len(units)
     pairs: list[list[Pair | None]] = [[None] * count for _ in range(count)]
+    rms = [np.stack([episodes.rms for episodes in unit.episodes]) for unit in units]
     for a in range(count):
         for b in range(a + 1, count):
-            pairs[a][b], pairs[b][a] = _pair(entries[0], entries[a], entries[b])
+            pairs[a][b], pairs[b][a] = _pair(rms[0][0], rms[a], rms[b])
     return pairs
 
 
-def _pair(still: Entry, first: Entry, second: Entry) -> tuple[Pair, Pair] | tuple[None, None]:
-    """The second beside the first, and the first beside the second, which is its mirror image."""
-    n = min(len(first.episodes.omega1), len(second.episodes.omega1))
-    theirs, ours = first.episodes.rms[:n], second.episodes.rms[:n]
+def _pair(still: FloatArray, first: FloatArray, second: FloatArray) -> tuple[Pair, Pair] | tuple[None, None]:
+    """The second beside the first, and the first beside the second, which is its mirror image: RMS (seeds, N).
+
+    Of several seeds the mean counts, in each scenario; for the ratio the geometric one.
+    """
+    n = min(first.shape[1], second.shape[1])
+    theirs, ours = first[:, :n], second[:, :n]
     if not (ours > 0.0).all() or not (theirs > 0.0).all():
         return None, None
-    difference = Interval.of((theirs - ours) / still.episodes.rms[:n])
-    logarithm = np.log(ours / theirs)
+    difference = Interval.of((theirs.mean(axis=0) - ours.mean(axis=0)) / still[:n])
+    logarithm = np.log(ours).mean(axis=0) - np.log(theirs).mean(axis=0)
     ratio, (low, high) = Interval.of(logarithm), np.quantile(logarithm, (0.05, 0.95))
-    better, worse = float(np.mean(ours < theirs)), float(np.mean(theirs < ours))
+    better, worse = float(np.mean(logarithm < 0.0)), float(np.mean(logarithm > 0.0))
     return (
         Pair(n, difference, _exp(ratio), (math.exp(low), math.exp(high)), better),
         Pair(n, _minus(difference), _exp(_minus(ratio)), (math.exp(-high), math.exp(-low)), worse),
@@ -356,12 +416,13 @@ def choose_examples(left: list[FloatArray], reference: int) -> dict[int, str]:
     return chosen
 
 
-def _example(comparison: Comparison, field: Field, index: int, label: str) -> Example:
+def _example(comparison: Comparison, units: Sequence[_Unit], field: Field, index: int, label: str) -> Example:
+    """A scenario with the histories of single policies; agents of several seeds are in it seed by seed."""
     radius = comparison.scenarios[index].crane.winch.drum_radius
     histories = []
-    for place, entry in enumerate(comparison.entries):
-        episodes = entry.episodes
-        if index < len(episodes.omega1):
+    for place, unit in enumerate(units):
+        entry, episodes = unit.members[0], unit.members[0].episodes
+        if len(unit.members) == 1 and index < len(episodes.omega1):
             end = intact(episodes, index)
             histories.append(
                 History(

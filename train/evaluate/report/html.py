@@ -50,6 +50,7 @@ def _page(comparison: Comparison, command: str) -> str:
         model=MODELS[comparison.config.model],
         modes=comparison.config.rfem_modes,
         duration=comparison.config.duration,
+        policies=len(comparison.entries),
         count=len(comparison.scenarios),
         ranges=_ranges(shown),
         content=shown,
@@ -62,10 +63,15 @@ def _page(comparison: Comparison, command: str) -> str:
     )
 
 
-def _group(shown: Content, subset: Subset, kind: Knowledge) -> list[tuple[int, Row]]:
-    """Place and figures of the policies that know so much, the best first."""
+def _group(shown: Content, subset: Subset, kind: Knowledge) -> list[tuple[int, Row, int]]:
+    """Place, figures and family of the policies that know so much, the best first; seeds stand below their family."""
+
+    def order(place: int) -> tuple[float, int, bool, float]:
+        family = shown.policies[place].family
+        return -subset.figures[family].reduction.value, family, place != family, -subset.figures[place].reduction.value
+
     places = [i for i, policy in enumerate(shown.policies) if policy.knows == kind.value]
-    return [(i, subset.figures[i]) for i in sorted(places, key=lambda i: -subset.figures[i].reduction.value)]
+    return [(i, subset.figures[i], shown.policies[i].family) for i in sorted(places, key=order)]
 
 
 def _ranges(shown: Content) -> list[tuple[str, float, float]]:

@@ -45,9 +45,12 @@
   const DASHES = ["solid", "dot"];
   const narrow = () => window.innerWidth < 640;
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-  const tint = (policy) => colour(policy === 0 ? "still" : `c${(policy - 1) % COLOURS}`);
+  // Agents that differ in their seed alone are one family, of one colour.
+  const families = report.policies.flatMap(({ family }, policy) => (family === policy ? [policy] : []));
+  const rank = (policy) => families.indexOf(report.policies[policy].family) - 1;
+  const tint = (policy) => colour(rank(policy) < 0 ? "still" : `c${rank(policy) % COLOURS}`);
   const dash = (policy) =>
-    report.policies[policy].privileged ? "dash" : DASHES[Math.floor(Math.max(0, policy - 1) / COLOURS) % DASHES.length];
+    report.policies[policy].privileged ? "dash" : DASHES[Math.floor(Math.max(0, rank(policy)) / COLOURS) % DASHES.length];
   const line = (policy, width = 2) => ({ color: tint(policy), width, dash: dash(policy) });
 
   function axis(title, extra = {}) {
@@ -109,44 +112,68 @@
     });
   }
 
-  // ---- policies to tick -----------------------------------------------------------------------------------------
+  // ---- policies to tick and to open -----------------------------------------------------------------------------
 
-  // What is drawn of a section's policies: a set that its checkboxes change.
-  function chips(section, chosen, redraw) {
-    const holder = section.querySelector(".chips");
-    const boxes = report.policies.map((policy, index) => {
+  const several = (policy) => report.policies[policy].seeds.length > 1;
+  const opened = new Set();
+  // Policies as they stand in table and pictures: a family as one, or where it is opened its seeds.
+  const shownOf = (policies) => policies.flatMap((policy) => (opened.has(policy) ? report.policies[policy].seeds : [policy]));
+
+  // One choice for all pictures: families that checkboxes tick, and their line in the bar.
+  function chips(chosen, redraw) {
+    const holder = element("policies").querySelector(".chips");
+    const tick = (box) => { if (box.checked) chosen.add(Number(box.dataset.policy)); else chosen.delete(Number(box.dataset.policy)); };
+    const boxes = families.map((policy) => {
       const label = document.createElement("label");
       label.className = "chip";
-      const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: chosen.has(index) });
-      box.dataset.policy = index;
-      const sample = Object.assign(document.createElement("i"), { className: "line" });
-      sample.dataset.policy = index;
-      label.append(box, sample, policy.name, document.createElement("small"));
-      if (policy.privileged) label.title = "knows the whole future";
-      box.addEventListener("change", () => {
-        if (box.checked) chosen.add(index); else chosen.delete(index);
-        redraw();
-      });
+      const box = Object.assign(document.createElement("input"), { type: "checkbox", checked: chosen.has(policy) });
+      box.dataset.policy = policy;
+      label.append(box, sample(policy), report.policies[policy].name);
+      if (report.policies[policy].privileged) label.title = "knows the whole future";
+      box.addEventListener("change", () => { tick(box); redraw(); });
       holder.append(label);
       return box;
     });
     for (const [word, wanted] of [["all", true], ["none", false]]) {
       const button = Object.assign(document.createElement("button"), { type: "button", textContent: word });
       button.addEventListener("click", () => {
-        for (const [index, box] of boxes.entries()) {
-          box.checked = wanted;
-          if (wanted) chosen.add(index); else chosen.delete(index);
-        }
+        for (const box of boxes) { box.checked = wanted; tick(box); }
         redraw();
       });
       holder.append(button);
     }
-    return boxes;
+  }
+
+  function sample(policy) {
+    const line = Object.assign(document.createElement("i"), { className: "line" });
+    line.dataset.policy = policy;
+    return line;
+  }
+
+  // Names of policies behind samples of their lines, each with a word where there is one.
+  function legend(holder, policies, word = () => "") {
+    holder.replaceChildren(...policies.map((policy) => {
+      const item = document.createElement("span");
+      item.append(sample(policy), report.policies[policy].name);
+      if (word(policy)) item.append(Object.assign(document.createElement("small"), { textContent: word(policy) }));
+      return item;
+    }));
+    colourSamples(holder);
+  }
+
+  function colourSamples(within = document) {
+    for (const line of all(".line[data-policy]", within)) {
+      const policy = Number(line.dataset.policy);
+      line.style.borderTop = `3px ${{ solid: "solid", dash: "dashed", dot: "dotted" }[dash(policy)]} ${tint(policy)}`;
+    }
+  }
+
+  function bar() {
+    legend(element("shown"), inOrder(drawn));
+    if (!drawn.size) element("shown").textContent = "none";
   }
 
   const inOrder = (chosen) => [...chosen].sort((a, b) => a - b);
-  const everyone = report.policies.map((_, index) => index);
-  const featured = report.featured;
   const marked = (policy) => report.policies[policy].name + (report.policies[policy].privileged ? " (privileged)" : "");
 
   function fill(select, options, value) {
@@ -160,11 +187,13 @@
 
   function table() {
     for (const body of all("#table tbody")) body.hidden = Number(body.dataset.subset) !== subset;
+    for (const row of all("#table tr[data-family]")) row.hidden = !opened.has(Number(row.dataset.family));
+    for (const button of all("#table .open")) button.setAttribute("aria-expanded", opened.has(Number(button.dataset.policy)));
     for (const select of all("select.subset")) select.value = subset;
   }
 
-  function profiles(section, chosen) {
-    const curves = inOrder(chosen).map((policy) => [policy, report.subsets[subset].profiles[policy]]);
+  function profiles(section, policies) {
+    const curves = policies.map((policy) => [policy, report.subsets[subset].profiles[policy]]);
     draw(section.querySelector(".plot"), curves.map(([policy, { x, y }]) => ({
       // From nobody at its best, through the steps, to everybody out to the edge.
       x: [x[0], ...x, BEYOND], y: [0, ...y, 1], name: marked(policy), mode: "lines", line: { ...line(policy, 2.2), shape: "hv" },
@@ -180,10 +209,10 @@
 
   function pairs(section) {
     const reference = Number(element("reference").value);
-    const found = everyone.map((policy) => [policy, report.pairs[reference][policy]]).filter(([, pair]) => pair);
+    const found = shownOf(families).map((policy) => [policy, report.pairs[reference][policy]]).filter(([, pair]) => pair);
     // Privileged policies stand apart, below all others.
-    const rank = ([policy]) => (report.policies[policy].privileged ? 1 : 0);
-    found.sort((a, b) => rank(a) - rank(b) || a[1].ratio.value - b[1].ratio.value);
+    const apart = ([policy]) => (report.policies[policy].privileged ? 1 : 0);
+    found.sort((a, b) => apart(a) - apart(b) || a[1].ratio.value - b[1].ratio.value);
     const ends = found.flatMap(([, pair]) => [...pair.spread, pair.ratio.low, pair.ratio.high]);
     const places = found.map((_, place) => found.length - 1 - place);
     const traces = found.flatMap(([policy, pair], index) => [
@@ -230,8 +259,7 @@
     }));
   }
 
-  function dependence(section, chosen) {
-    const policies = inOrder(chosen);
+  function dependence(section, policies) {
     const every = policies.flatMap((policy) => report.clouds[policy].left);
     all(".plot", section).forEach((figure, place) => {
       const { label, x, median } = report.dependences[place];
@@ -253,15 +281,15 @@
     });
   }
 
-  function histories(section, chosen, boxes) {
+  function histories(section, policies) {
     const example = report.examples[Number(element("scenario").value)];
     const ran = new Map(example.histories.map((history) => [history.policy, history]));
-    for (const [policy, box] of boxes.entries()) {
-      box.disabled = !ran.has(policy);
-      box.parentElement.querySelector("small").textContent = ran.has(policy) ? percent(ran.get(policy).reduction) : "did not run";
-    }
+    // A family as its first seed.
+    const shown = policies.flatMap((policy) => ran.get(report.policies[policy].seeds[0]) ?? []);
+    const left = policies.filter((policy) => !ran.has(report.policies[policy].seeds[0]));
+    legend(section.querySelector(".legend"), [...shown.map((history) => history.policy), ...left],
+      (policy) => (ran.has(policy) ? percent(ran.get(policy).reduction) : "did not run"));
     element("scenario-traits").textContent = `Scenario ${example.scenario}: ${traits(example.traits)}.`;
-    const shown = inOrder(chosen).filter((policy) => ran.has(policy)).map((policy) => ran.get(policy));
     const rows = [
       ["error", "depth error, m", "y", 1],
       ["error", "the same, cm", "y2", 100],
@@ -294,11 +322,11 @@
     return 115 * Math.max(...middle.error.map(Math.abs), 1e-5);
   }
 
-  function spectra(section, chosen) {
+  function spectra(section, policies) {
     const curves = report.subsets[subset].spectra;
     const [lowest, highest] = [curves[0].x[0], curves[0].x.at(-1)];
-    const top = Math.max(...(chosen.size ? inOrder(chosen) : everyone).flatMap((policy) => curves[policy].y));
-    draw(section.querySelector(".plot"), inOrder(chosen).map((policy) => ({
+    const top = Math.max(...(policies.length ? policies : families).flatMap((policy) => curves[policy].y));
+    draw(section.querySelector(".plot"), policies.map((policy) => ({
       ...report.subsets[subset].spectra[policy], name: marked(policy), mode: "lines", line: line(policy),
       text: report.subsets[subset].spectra[policy].x.map((frequency) => `${rounded(frequency)} Hz (${rounded(1 / frequency)} s)`),
       hovertemplate: "%{fullData.name} at %{text}: %{y:.2e} m²/Hz<extra></extra>",
@@ -344,24 +372,29 @@
   // ---- bring it to life -----------------------------------------------------------------------------------------
 
   const sections = Object.fromEntries(all("main section").map((section) => [section.id, section]));
-  const drawn = {
-    profiles: new Set(everyone.slice(1)), dependence: new Set(featured.filter((policy) => policy > 0)),
-    histories: new Set([0, ...featured]), spectra: new Set([0, ...featured]),
-  };
+  const drawn = new Set([0, ...report.featured]);
+  const pictured = () => shownOf(inOrder(drawn));
   const redraw = {
-    table, profiles: () => profiles(sections.profiles, drawn.profiles), pairs: () => pairs(sections.pairs),
-    dependence: () => dependence(sections.dependence, drawn.dependence),
-    histories: () => histories(sections.histories, drawn.histories, boxes.histories),
-    spectra: () => spectra(sections.spectra, drawn.spectra), worst,
+    table, bar, profiles: () => profiles(sections.profiles, pictured()), pairs: () => pairs(sections.pairs),
+    dependence: () => dependence(sections.dependence, pictured()),
+    histories: () => histories(sections.histories, pictured()),
+    spectra: () => spectra(sections.spectra, pictured()), worst,
   };
-  const boxes = {};
-  for (const [name, chosen] of Object.entries(drawn)) {
-    boxes[name] = chips(sections[name], chosen, () => redraw[name]());
+  const again = (...names) => { for (const name of names) redraw[name](); };
+  chips(drawn, () => again("bar", "profiles", "dependence", "histories", "spectra"));
+  for (const button of all("#table .open")) {
+    const policy = Number(button.dataset.policy);
+    button.addEventListener("click", () => {
+      if (opened.has(policy)) opened.delete(policy); else opened.add(policy);
+      again("table", "profiles", "pairs", "dependence", "histories", "spectra");
+    });
   }
 
-  const names = everyone.map((policy) => [policy, marked(policy)]);
-  fill(element("reference"), names, report.reference);
-  fill(element("worst-policy"), names.filter(([policy]) => report.worst[policy].length), report.reference || 1);
+  const named = (policies) => policies.map((policy) => [policy, marked(policy)]);
+  const single = report.policies.flatMap((_, policy) => (several(policy) ? [] : [policy]));
+  fill(element("reference"), named(families), report.reference);
+  fill(element("worst-policy"), named(single.filter((policy) => report.worst[policy].length)),
+    report.policies[report.reference || 1].seeds[0]);
   fill(element("scenario"), report.examples.map(({ scenario, label, traits: t }, index) => [
     index, `${label}: scenario ${scenario}` + (t.hs === null ? "" : `, Hs ${t.hs.toFixed(1)} m, Tp ${t.tp.toFixed(1)} s`),
   ]), 0);
@@ -371,16 +404,13 @@
   for (const select of all("select.subset")) {
     select.addEventListener("change", () => {
       subset = Number(select.value);
-      for (const name of ["table", "profiles", "spectra"]) redraw[name]();
+      again("table", "profiles", "spectra");
     });
   }
 
   function everything() {
-    for (const sample of all(".line[data-policy]")) {
-      const policy = Number(sample.dataset.policy);
-      sample.style.borderTop = `3px ${{ solid: "solid", dash: "dashed", dot: "dotted" }[dash(policy)]} ${tint(policy)}`;
-    }
-    for (const paint of Object.values(redraw)) paint();
+    colourSamples();
+    again(...Object.keys(redraw));
   }
 
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
