@@ -114,7 +114,7 @@ def _drive_for_each(name: str, tuned: Tuned, optimiser: Optimiser = "nelder-mead
     return PolicySpec(name, build, for_each_scenario=True)
 
 
-_ANY_WAVES: Final = ExpectedWaves(frequency=(0.5, 1.0), variance=(0.1, 0.1), build_up=0.0)
+_ANY_WAVES: Final = ExpectedWaves(frequency=(0.5, 1.0), variances=((0.1, 0.1),), build_up=0.0)
 """Waves for a policy that is only asked its name: those of a task take a fraction of a second to find."""
 
 

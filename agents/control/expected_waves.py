@@ -1,8 +1,9 @@
-"""Waves that a task lets expect: the mean spectrum of the pulley's heave rate over the scenarios it draws.
+"""Waves that a task lets expect: mean spectra of the pulley's heave rate over the scenarios it draws.
 
 A filter of the motion needs to know how much of it lies at which frequency, and how fast it comes up at the start of a
 lift. That is the statistics of the sea at hand, never the waves of an episode: other scenarios are drawn for it than
-any that is trained on or evaluated.
+any that is trained on or evaluated. The seas that a task draws are sorted into kinds, from the long swell to the short
+sea: which kind it is, a filter finds out as it goes.
 """
 
 from __future__ import annotations
@@ -11,11 +12,13 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import chain
 from typing import Final, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
-from aframe_env.scenario import Scenario, ScenarioSource
+from aframe_env.scenario import Scenario, ScenarioDistribution, ScenarioSource
 from aframe_env.scenario.crane import Crane
 from aframe_env.scenario.motion import ComplexArray, Coordinate, has_components, is_tabled
 from aframe_env.scenario.sea import SeaMotion
@@ -27,6 +30,8 @@ FloatOrComplex = TypeVar("FloatOrComplex", FloatArray, ComplexArray)
 SEED: Final = 3_000_017
 """Seed of the scenarios that the spectrum is the mean of."""
 SCENARIOS: Final = 512
+KINDS: Final = 32
+"""Kinds of sea, each as likely as the others."""
 BANDS: Final = 48
 """Bands of frequency that the spectrum is told in."""
 OUTSIDE: Final = 2e-3
@@ -48,22 +53,30 @@ class ExpectedWaves:
 
     frequency: tuple[float, ...]
     """Middle of each band, rad/s, increasing."""
-    variance: tuple[float, ...]
-    """Variance of the heave rate in each band, m²/s²."""
+    variances: tuple[tuple[float, ...], ...]
+    """Variance of the heave rate in each band, m²/s², in each kind of sea; all kinds are as likely."""
     build_up: float
     """Time over which the motion comes up to that at the start of a lift, s; 0 for a ship that moves already."""
 
     def __post_init__(self) -> None:
-        if not len(self.frequency) == len(self.variance) > 1:
-            raise InvalidValue(
-                f"{len(self.frequency)} frequencies and {len(self.variance)} variances of waves: "
-                "must be as many, and two at least"
-            )
+        if not self.variances:
+            raise InvalidValue("no variances of waves: there must be one kind of sea at least")
+        for each in self.variances:
+            if not len(self.frequency) == len(each) > 1:
+                raise InvalidValue(
+                    f"{len(self.frequency)} frequencies and {len(each)} variances of waves: "
+                    "must be as many, and two at least"
+                )
         for value in self.frequency:
             require_number("frequency", value, "rad/s", low=0.0, high=100.0, low_open=True)
-        for value in self.variance:
+        for value in chain.from_iterable(self.variances):
             require_number("variance", value, "m²/s²", low=0.0, high=1e4, low_open=True)
         require_number("build_up", self.build_up, "s", low=0.0, high=1e4)
+
+    @property
+    def variance(self) -> tuple[float, ...]:
+        """Mean variance of the heave rate in each band over the kinds, m²/s²."""
+        return tuple(np.mean(self.variances, axis=0).tolist())
 
     @classmethod
     def of(cls, source: ScenarioSource) -> ExpectedWaves:
@@ -80,22 +93,35 @@ def _expected(source: ScenarioSource) -> ExpectedWaves:
         scenarios = [source.draw(rng) for _ in range(SCENARIOS)]
     lines = list(_spectra(scenarios))
     frequency, variance = np.concatenate([line[0] for line in lines]), np.concatenate([line[1] for line in lines])
-    variance = variance / len(scenarios)
     low, high = _band(frequency, variance)
     middle = np.linspace(low, high, BANDS)
     edges = np.concatenate([[-math.inf], 0.5 * (middle[1:] + middle[:-1]), [math.inf]])
-    inside = np.histogram(frequency, edges, weights=variance)[0]
-    # Smoothed over neighbours: a mean over a few hundred seas still has teeth.
-    padded = np.pad(inside, 1, mode="edge")
-    smooth = 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
+    inside = np.stack([np.histogram(line[0], edges, weights=line[1])[0] for line in lines])
     # As much as in a middling sea, not in the mean of all: gains go by the logarithm.
-    each = np.array([line[1].sum() for line in lines])
+    each = inside.sum(axis=1)
     total = float(np.exp(np.log(np.maximum(each, LEAST_VARIANCE)).mean()))
-    shares = smooth / smooth.sum() if smooth.any() else np.full(BANDS, 1.0 / BANDS)
-    floored = np.maximum(shares, FLOOR / BANDS) * total
+    shares = inside / np.maximum(each, LEAST_VARIANCE)[:, None]
+    kinds = KINDS if isinstance(source, ScenarioDistribution) else 1
+    of_kinds = (shares[kind].mean(axis=0) for kind in np.array_split(_from_the_longest(shares, middle), kinds))
     return ExpectedWaves(
-        frequency=tuple(middle.tolist()), variance=tuple(floored.tolist()), build_up=float(scenarios[0].ramp)
+        frequency=tuple(middle.tolist()),
+        variances=tuple(tuple((total * _smooth(kind)).tolist()) for kind in of_kinds),
+        build_up=float(scenarios[0].ramp),
     )
+
+
+def _from_the_longest(shares: FloatArray, middle: FloatArray) -> npt.NDArray[np.int64]:
+    """Indices (N,) of the seas, that of the longest waves first, from the shares (N, bands) of their variance."""
+    return np.argsort(shares @ middle, kind="stable")
+
+
+def _smooth(shares: FloatArray) -> FloatArray:
+    """Shares (bands,) of some seas' variance, smoothed over neighbours: a mean of them still has teeth."""
+    if not shares.any():
+        return np.full(len(shares), 1.0 / len(shares))
+    padded = np.pad(shares, 1, mode="edge")
+    smooth = 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
+    return np.asarray(np.maximum(smooth / smooth.sum(), FLOOR / len(shares)))
 
 
 def _another(scenario: Scenario, seed: int) -> Scenario:

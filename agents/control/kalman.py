@@ -3,20 +3,25 @@
 Dead reckoning by the heave rate drifts by centimetres, and the depth sensor is too coarse and too slow to hold it. But
 a ship in waves moves within a band of frequencies: ``WaveFilter`` holds its heave as a bank of oscillators of that
 band (after Küchler, Mahl, Neupert, Schneider, Sawodny, IEEE/ASME Transactions on Mechatronics, 2011, with fixed bands
-in place of modes that are identified on line), which also tell the motion to come. ``RopeFilter`` follows the load as
-it bobs on its rope.
+in place of modes that are identified on line), which also tell the motion to come. How much of the motion lies in which
+band depends on the sea: there is a filter for each kind of sea, and their estimates count by how well each has foretold
+the readings so far (Magill, IEEE Transactions on Automatic Control 10, 1965). ``RopeFilter`` follows the load as it
+bobs on its rope.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numba import prange
 
+from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar
 from aframe_env.scenario.sensors import Sensors
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import ALL, FloatArray, Rows
@@ -26,6 +31,9 @@ LEAST_RATE_NOISE: Final = 0.001
 """Least standard deviation of a reading of the heave rate that is reckoned with, m/s."""
 LEAST_DEPTH_NOISE: Final = 0.001
 """And of the depth, m."""
+
+LEAST_MISFIT: Final = 1e-12
+"""Least mean square of the readings' deviations that is reckoned with, as a share of their variance."""
 
 ComplexArray = npt.NDArray[np.complex128]
 
@@ -60,12 +68,14 @@ class WaveBank:
 
 @dataclass(frozen=True)
 class Schedule:
-    """Gains of K control steps; those of the last period of the depth sensor repeat from then on."""
+    """Gains of K control steps for M kinds of sea; those of the last period of the depth sensor repeat from then on."""
 
     rate: ComplexArray
-    """(K, bands + 1) gains of a reading of the heave rate, on the oscillators and on the offset."""
+    """(K, M, bands + 1) gains of a reading of the heave rate, on the oscillators and on the offset."""
     depth: ComplexArray
-    """(K, bands + 1) gains of a reading of the depth; zero where there is none."""
+    """(K, M, bands + 1) gains of a reading of the depth; zero where there is none."""
+    spread: FloatArray
+    """(K, M) variance of a reading of the heave rate about what is foretold of it, m²/s²."""
     hold: int
     """Control steps between two readings of the depth."""
 
@@ -77,43 +87,39 @@ class Schedule:
 
 @cache
 def schedule(bank: WaveBank, period: float, hold: int) -> Schedule:
-    """Gains of the Kalman filter by the recursion of its covariance over 60 s."""
+    """Gains of the Kalman filters by the recursion of their covariances over 60 s."""
     steps = hold * round(60.0 / period / hold) + hold
     exponent = exponents(bank)
-    bands, build_up = len(exponent), bank.waves.build_up
-    transition = np.append(np.exp(exponent * period), 1.0)[:, None]
+    variances = np.array(bank.waves.variances)
+    (kinds, bands), build_up = variances.shape, bank.waves.build_up
+    transition = np.exp(exponent * period)
     rate = np.append(np.tile([1.0, 0.0], bands), 0.0)
     inverse = 1.0 / exponent
     depth = np.append(np.stack([inverse.real, -inverse.imag], axis=1).ravel(), 1.0)
-    moving = np.arange(0, 2 * bands, 2)  # it is the rates that are stirred: a displacement does not jump
-    variance = np.array(bank.waves.variance)
+    # It is the rates that are stirred: a displacement does not jump.
+    rising = period * np.arange(steps) < build_up
+    grow = np.where(rising, 2.0 * period / build_up if build_up else 0.0, -np.expm1(-2.0 * bank.damping * period))
     # A ship that moves already has all of it, in both parts of every oscillator.
-    covariance = np.diag(np.append(np.zeros(2 * bands) if build_up else np.repeat(variance, 2), 1e-6))
-    gains = np.zeros((2, steps, 2 * bands + 1))
-    for step in range(1, steps):
-        covariance = _propagated(transition, _propagated(transition, covariance).T)
-        rising = step * period < build_up
-        grow = 2.0 * period / build_up if rising else -np.expm1(-2.0 * bank.damping * period)
-        covariance[moving, moving] += 2.0 * variance * grow
-        covariance[-1, -1] += bank.offset_drift * period
-        for kind, row, noise in ((0, rate, bank.rate_noise), (1, depth, bank.depth_noise)):
-            if kind == 0 or step % hold == 0:
-                cross_covariance = (covariance * row).sum(axis=1)
-                gains[kind, step] = cross_covariance / ((row * cross_covariance).sum() + noise**2)
-                covariance -= np.outer(gains[kind, step], cross_covariance)
+    start = np.zeros((kinds, 2 * bands + 1))
+    start[:, :-1] = 0.0 if build_up else np.repeat(variances, 2, axis=1)
+    start[:, -1] = 1e-6
+    gains, spread = np.zeros((2, kinds, steps, 2 * bands + 1)), np.ones((kinds, steps))
+    for kind in range(kinds):
+        _kernels().recurse(
+            start[kind],
+            transition,
+            2.0 * variances[kind],
+            grow,
+            bank.offset_drift * period,
+            np.stack([rate, depth]),
+            (bank.rate_noise**2, bank.depth_noise**2),
+            hold,
+            gains[:, kind],
+            spread[kind],
+        )
     paired = gains[..., :-1:2] + 1j * gains[..., 1::2]
-    both = np.concatenate([paired, gains[..., -1:]], axis=-1)
-    return Schedule(both[0], both[1], hold)
-
-
-def _propagated(transition: ComplexArray, columns: FloatArray) -> FloatArray:
-    """Columns (2 bands + 1, n) of oscillators, real and imaginary parts in turn, a control step later.
-
-    No matrix product: the last digit of such a one depends on the threads that happen to share it.
-    """
-    pairs = np.concatenate([columns, np.zeros_like(columns[:1])])
-    later = transition * (pairs[::2] + 1j * pairs[1::2])
-    return np.stack([later.real, later.imag], axis=1).reshape(pairs.shape)[:-1]
+    both = np.ascontiguousarray(np.concatenate([paired, gains[..., -1:]], axis=-1).swapaxes(1, 2))
+    return Schedule(both[0], both[1], np.ascontiguousarray(spread.T), hold)
 
 
 def exponents(bank: WaveBank) -> ComplexArray:
@@ -129,28 +135,57 @@ class WaveFilter:
         self._schedule = schedule(bank, control_period, hold)
         self._exponent = exponents(bank)
         self._transition = np.append(np.exp(self._exponent * control_period), 1.0)
-        self._state = np.zeros((rows, len(self._exponent) + 1), dtype=np.complex128)
-        """The heave rate is the sum of the real parts of all but the last, m/s; the last is the offset, m."""
+        kinds, parts = self._schedule.rate.shape[1:]
+        self._of_kinds = np.zeros((rows, kinds, parts), dtype=np.complex128)
+        """For each kind of sea the heave rate is the sum of the real parts of all but the last, m/s; the last is the
+        offset, m."""
+        self._state = np.zeros((rows, parts), dtype=np.complex128)
+        """The kinds' mean by their probabilities."""
+        self._misfit = np.zeros((rows, kinds))
+        """Sum of the readings' squared deviations from what each kind foretold, as shares of their variance."""
+        self._log_spread = np.zeros((rows, kinds))
+        """Sum of the logarithms of these variances."""
+        self.probability = np.full((rows, kinds), 1.0 / kinds)
+        """(N, M) of each kind of sea, by the readings so far."""
         self._step = np.zeros(rows, dtype=np.int64)
-        self.innovation = np.zeros(rows)
-        """Latest reading of the heave rate less what was foretold of it, (N,) m/s."""
 
     def start(self, rows: Rows = ALL) -> None:
         """Begin in these rows with a ship at rest."""
+        self._of_kinds[rows] = 0.0
         self._state[rows] = 0.0
+        self._misfit[rows] = 0.0
+        self._log_spread[rows] = 0.0
+        self.probability[rows] = 1.0 / self.probability.shape[1]
         self._step[rows] = 0
-        self.innovation[rows] = 0.0
 
     def advance(self, heave_rate: FloatArray) -> None:
         """Take a reading (N,) m/s of the pulley's heave rate, a control step later."""
         self._step += 1
-        self._state *= self._transition
-        self.innovation = heave_rate - self._state[:, :-1].real.sum(axis=1)
-        self._state += self.innovation[:, None] * self._schedule.rate[self._schedule.index(self._step)]
+        _kernels().advance(
+            self._of_kinds,
+            self._transition,
+            heave_rate,
+            self._schedule.rate,
+            self._schedule.spread,
+            self._schedule.index(self._step),
+            self._step,
+            self._misfit,
+            self._log_spread,
+            self.probability,
+            self._state,
+        )
 
     def correct(self, innovation: FloatArray) -> None:
         """Take the innovation (N,) m of the depth; it counts in the steps that have a reading."""
-        self._state += innovation[:, None] * self._schedule.depth[self._schedule.index(self._step)]
+        _kernels().correct(
+            self._of_kinds,
+            1.0 / self._exponent,
+            innovation,
+            self._schedule.depth,
+            self._schedule.index(self._step),
+            self.probability,
+            self._state,
+        )
 
     def heave(self) -> FloatArray:
         """Rise (N,) m of the pulley since the start, and the offset."""
@@ -183,6 +218,119 @@ class WaveFilter:
     def _sum(self, factors: ComplexArray) -> FloatArray:
         # Row by row in the same order, whatever the batch: a sum, not a matrix product.
         return np.asarray((factors[:, None, :] * self._state[None, :, :-1]).real.sum(axis=2))
+
+
+class _Kernels(NamedTuple):
+    recurse: Callable[..., None]
+    advance: Callable[..., None]
+    correct: Callable[..., None]
+
+
+@scalar
+def _mix(of_kinds: ComplexArray, probability: FloatArray, state: ComplexArray) -> None:
+    """Put the kinds' mean (parts,) into ``state``."""
+    for part in range(state.shape[0]):
+        mean = 0.0j
+        for kind in range(of_kinds.shape[0]):
+            mean += probability[kind] * of_kinds[kind, part]
+        state[part] = mean
+
+
+@scalar
+def _weigh(misfit: FloatArray, log_spread: FloatArray, readings: int, probability: FloatArray) -> None:
+    """Put the kinds' probabilities (M,) by their likelihood into ``probability``.
+
+    How high the waves are is not known: it is what makes a kind's readings the likeliest.
+    """
+    best = -math.inf
+    for kind in range(probability.shape[0]):
+        height = max(misfit[kind] / readings, LEAST_MISFIT)
+        probability[kind] = -0.5 * (readings * math.log(height) + log_spread[kind])
+        best = max(best, probability[kind])
+    total = 0.0
+    for kind in range(probability.shape[0]):
+        probability[kind] = math.exp(probability[kind] - best)
+        total += probability[kind]
+    for kind in range(probability.shape[0]):
+        probability[kind] /= total
+
+
+@cache
+def _kernels() -> _Kernels:
+    @kernel
+    def recurse(start, transition, stir, grow, drift, rows, noise, hold, gains, spread):  # type: ignore[no-untyped-def]
+        parts, bands = start.shape[0], transition.shape[0]
+        covariance = np.diag(start)
+        cross = np.empty(parts)
+        for step in range(1, spread.shape[0]):
+            # A turn of each oscillator, on the rows and then on the columns.
+            for i in range(bands):
+                c, s = transition[i].real, transition[i].imag
+                for j in range(parts):
+                    x, y = covariance[2 * i, j], covariance[2 * i + 1, j]
+                    covariance[2 * i, j], covariance[2 * i + 1, j] = c * x - s * y, s * x + c * y
+            for j in range(parts):
+                for i in range(bands):
+                    c, s = transition[i].real, transition[i].imag
+                    x, y = covariance[j, 2 * i], covariance[j, 2 * i + 1]
+                    covariance[j, 2 * i], covariance[j, 2 * i + 1] = c * x - s * y, s * x + c * y
+            for i in range(bands):
+                covariance[2 * i, 2 * i] += stir[i] * grow[step]
+            covariance[-1, -1] += drift
+            for sensor in range(2):
+                if sensor == 1 and step % hold != 0:
+                    continue
+                seen = noise[sensor]
+                for j in range(parts):
+                    cross[j] = 0.0
+                    for k in range(parts):
+                        cross[j] += covariance[j, k] * rows[sensor, k]
+                    seen += cross[j] * rows[sensor, j]
+                if sensor == 0:
+                    spread[step] = seen
+                for j in range(parts):
+                    gains[sensor, step, j] = cross[j] / seen
+                    for k in range(parts):
+                        covariance[j, k] -= gains[sensor, step, j] * cross[k]
+
+    @parallel_kernel
+    def advance(  # type: ignore[no-untyped-def]
+        of_kinds, transition, reading, gain, spread, index, readings, misfit, log_spread, probability, state
+    ):
+        kinds, parts = of_kinds.shape[1:]
+        for row in prange(of_kinds.shape[0]):
+            at = index[row]
+            for kind in range(kinds):
+                deviation = reading[row]
+                for part in range(parts):
+                    of_kinds[row, kind, part] *= transition[part]
+                    if part < parts - 1:
+                        deviation -= of_kinds[row, kind, part].real
+                for part in range(parts):
+                    of_kinds[row, kind, part] += deviation * gain[at, kind, part]
+                misfit[row, kind] += deviation * deviation / spread[at, kind]
+                log_spread[row, kind] += math.log(spread[at, kind])
+            _weigh(misfit[row], log_spread[row], readings[row], probability[row])
+            _mix(of_kinds[row], probability[row], state[row])
+
+    @parallel_kernel
+    def correct(of_kinds, inverse, innovation, gain, index, probability, state):  # type: ignore[no-untyped-def]
+        kinds, parts = of_kinds.shape[1:]
+        for row in prange(of_kinds.shape[0]):
+            at = index[row]
+            # The innovation is of the mean; each kind has its own.
+            reading = innovation[row] + state[row, parts - 1].real
+            for part in range(parts - 1):
+                reading += (state[row, part] * inverse[part]).real
+            for kind in range(kinds):
+                deviation = reading - of_kinds[row, kind, parts - 1].real
+                for part in range(parts - 1):
+                    deviation -= (of_kinds[row, kind, part] * inverse[part]).real
+                for part in range(parts):
+                    of_kinds[row, kind, part] += deviation * gain[at, kind, part]
+            _mix(of_kinds[row], probability[row], state[row])
+
+    return _Kernels(recurse, advance, correct)
 
 
 ACCELERATION_NOISE = 0.02

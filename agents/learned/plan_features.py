@@ -1,8 +1,9 @@
 """Features of the agents that correct predictive control: the plan, what it asks of the winch, and the waves to come.
 
 The network's output is added to the plan's first change of the drum's speed, as a share of what the winch can gain or
-lose in a control step, and the more so the nearer to its limits the winch will come: where it stays far from them,
-predictive control has little left to gain. With an output of zero the drum does what predictive control plans.
+lose in a control step. On the full state it counts the more the nearer to its limits the winch will come: where it
+stays far from them, predictive control leaves nothing to gain. With an output of zero the drum does what predictive
+control plans.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ DEMANDED: Final = (2, 10, 25, 49)
 """Those up to which the greatest demand on the winch is one."""
 
 FAR_FROM_LIMITS: Final = 0.6
-"""Greatest demand on the winch within the horizon, as a share of its limits, below which outputs move nothing; they
-have their full weight from 1 on."""
+"""Greatest demand on the winch within the horizon, as a share of its limits, below which outputs on the full state move
+nothing; they have their full weight from 1 on."""
 
 PLAN_FEATURES: Final = (
     "depth_error",
@@ -67,6 +68,8 @@ class PlanFeatures:
 
     def __init__(self, rows: int, config: FeatureConfig) -> None:
         self.rows = rows
+        self._knows_state = config.sensors is None
+        self._weight = np.ones(rows)
         self._planner = Planner(rows, config.control_period, PlanningConfig(sensors=config.sensors, waves=config.waves))
         self._heave, self._length, self._turn, self._planned = np.zeros((4, rows))
 
@@ -98,7 +101,8 @@ class PlanFeatures:
         self._rope_speed = plan.rope_speed
         self._planned = np.clip(2.0 * (plan.rope_speed - drum_speed) / self._gain, -1.0, 1.0)
         demand = np.maximum(plan.acceleration_demand, plan.speed_demand).max(axis=1)
-        self._weight = np.clip((demand - FAR_FROM_LIMITS) / (1.0 - FAR_FROM_LIMITS), 0.0, 1.0)
+        if self._knows_state:
+            self._weight = np.clip((demand - FAR_FROM_LIMITS) / (1.0 - FAR_FROM_LIMITS), 0.0, 1.0)
         regulated = 2.0 * (plan.regulated_rope_speed - drum_speed) / self._gain
         later = plan.drum_change[:, PLANNED] / self._gain[:, None]
         features = (

@@ -28,7 +28,7 @@ def write_agent(folder, seed):
         algorithm="PPO",
         observation="state",
         sensors=None,
-        waves=ExpectedWaves(frequency=(0.5, 1.0), variance=(0.1, 0.1), build_up=10.0),
+        waves=ExpectedWaves(frequency=(0.5, 1.0), variances=((0.1, 0.1),), build_up=10.0),
         action="residual",
         features=STATE_FEATURES,
         hidden=4,

@@ -12,7 +12,7 @@ from agents.control.kalman import ACCELERATION_NOISE, RopeFilter, WaveBank, Wave
 from agents.control.rope import RopeModel
 
 PERIOD = 0.1
-WAVES = ExpectedWaves(frequency=(0.5, 0.8, 1.3), variance=(0.02, 0.2, 0.07), build_up=1.0)
+WAVES = ExpectedWaves(frequency=(0.5, 0.8, 1.3), variances=((0.02, 0.2, 0.07),), build_up=1.0)
 
 
 def conditioned(a, start, stirs, rows, readings, noises):
@@ -127,7 +127,7 @@ def two_sines(times):
 
 def test_two_sines_are_foretold():
     """Once the filter has followed them, 0.1 s to 2 s ahead; a held value would be off by 2 sin(ω τ / 2)."""
-    sea = ExpectedWaves(frequency=tuple(np.linspace(0.35, 1.6, 48)), variance=(0.26 / 48,) * 48, build_up=10.0)
+    sea = ExpectedWaves(frequency=tuple(np.linspace(0.35, 1.6, 48)), variances=((0.26 / 48,) * 48,), build_up=10.0)
     waves = WaveFilter(2, PERIOD, 10, WaveBank.of(sea, Sensors()))
     ahead = np.array([0.1, 0.5, 2.0])
     missed_rate, missed_path, held = [], [], []

@@ -21,7 +21,7 @@ from agents.learned.network import Actor
 from agents.policy import Knowledge
 from agents.rollout import held_out_scenarios, run
 
-WAVES = ExpectedWaves(frequency=(0.5, 0.7, 0.9, 1.2), variance=(0.05, 0.1, 0.1, 0.05), build_up=5.0)
+WAVES = ExpectedWaves(frequency=(0.5, 0.7, 0.9, 1.2), variances=((0.05, 0.1, 0.1, 0.05),), build_up=5.0)
 
 
 def agent(observation="state", hidden=8, action="residual"):

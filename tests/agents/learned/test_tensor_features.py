@@ -27,7 +27,7 @@ RANGES = {
 """Of an observation's quantities; ± 5 for the others."""
 WAVES = st.builds(
     lambda low, width, bands, variance, build_up: ExpectedWaves(
-        frequency=tuple(np.linspace(low, low + width, bands)), variance=(variance,) * bands, build_up=build_up
+        frequency=tuple(np.linspace(low, low + width, bands)), variances=((variance,) * bands,), build_up=build_up
     ),
     low=st.floats(0.3, 0.6),
     width=st.floats(0.3, 1.2),
