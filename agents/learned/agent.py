@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -25,7 +26,7 @@ from agents.learned.features import Action, FeatureConfig
 from agents.learned.network import Actor
 from agents.policy import FloatArray, Knowledge
 
-FORMAT = 3
+FORMAT = 4
 WEIGHTS = "agent.safetensors"
 CARD = "agent.json"
 _BLOCK = 64
@@ -105,8 +106,9 @@ def digest(weights: bytes) -> str:
 
 
 def card_text(card: AgentCard) -> str:
-    """The card as JSON."""
-    return json.dumps(asdict(card), indent=2, ensure_ascii=False) + "\n"
+    """The card as JSON, lists of numbers on a line each."""
+    text = json.dumps(asdict(card), indent=2, ensure_ascii=False)
+    return re.sub(r"\[[^\[\]\"{}]*\]", lambda numbers: f"[{' '.join(numbers[0][1:-1].split())}]", text) + "\n"
 
 
 def seeds(folder: str | Path) -> list[Path]:

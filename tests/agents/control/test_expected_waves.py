@@ -11,7 +11,7 @@ from aframe_env import Harmonic, HarmonicMotion, InvalidValue, RecordedMotion, S
 from aframe_env.scenario.motion import has_components
 from aframe_env.scenario.sea import SeaMotion
 from agents.control import expected_waves
-from agents.control.expected_waves import BANDS, LEAST_VARIANCE, LEAST_WIDTH, SCENARIOS, WIDEST, ExpectedWaves
+from agents.control.expected_waves import BANDS, KINDS, LEAST_VARIANCE, LEAST_WIDTH, SCENARIOS, WIDEST, ExpectedWaves
 from agents.rollout import held_out_scenarios
 
 SAMPLING = 0.25
@@ -56,7 +56,7 @@ def test_of_one_sea_it_is_the_spectrum_of_other_realisations_of_it():
     np.testing.assert_allclose(expected, between, atol=0.05)
 
 
-def test_of_a_distribution_it_has_the_shape_of_the_mean_and_the_size_of_a_middling_sea():
+def test_of_a_distribution_the_kinds_have_the_mean_shape_of_all_seas_and_the_size_of_a_middling_one():
     source = ScenarioDistribution()
     waves = ExpectedWaves.of(source)
     rng = np.random.default_rng(99)
@@ -65,9 +65,10 @@ def test_of_a_distribution_it_has_the_shape_of_the_mean_and_the_size_of_a_middli
     for _ in range(150):
         record = heave_rate(source.draw(rng), times)
         hertz, density = welch(record, fs=1.0 / SAMPLING, nperseg=600)
-        spectra.append(density)
+        spectra.append(density / density.sum())
         variances.append(record.var())
-    assert sum(waves.variance) == pytest.approx(np.exp(np.mean(np.log(variances))), rel=0.3)
+    assert len(waves.variances) == KINDS
+    assert np.sum(waves.variances, axis=1) == pytest.approx(np.exp(np.mean(np.log(variances))), rel=0.3)
     frequency, shares = cumulated(2.0 * np.pi * hertz, np.mean(spectra, axis=0))
     middle, expected = cumulated(waves.frequency, waves.variance)
     step = middle[1] - middle[0]
@@ -75,6 +76,24 @@ def test_of_a_distribution_it_has_the_shape_of_the_mean_and_the_size_of_a_middli
     np.testing.assert_allclose(expected, between, atol=0.06)
     assert len(waves.frequency) == BANDS
     assert waves.build_up == source.ramp
+
+
+def test_kinds_go_from_the_longest_waves_to_the_shortest_and_each_is_narrower_than_their_mean():
+    waves = ExpectedWaves.of(ScenarioDistribution())
+    frequency, variances = np.array(waves.frequency), np.array(waves.variances)
+    mean = variances @ frequency / variances.sum(axis=1)
+    assert (np.diff(mean) > 0.0).all()
+    assert mean[-1] > 1.4 * mean[0]
+
+    def width(variance):
+        share = variance / variance.sum()
+        return np.sqrt(share @ (frequency - share @ frequency) ** 2)
+
+    assert np.median([width(each) for each in variances]) < 0.95 * width(np.array(waves.variance))
+
+
+def test_of_one_scenario_there_is_one_kind():
+    assert len(ExpectedWaves.of(one_sea()).variances) == 1
 
 
 def test_of_a_ship_at_rest_it_is_next_to_nothing():
@@ -157,13 +176,14 @@ def test_the_same_source_is_reckoned_once():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"variance": (0.1,)}, "2 frequencies and 1 variances"),
+        ({"variances": ((0.1, 0.1), (0.1,))}, "2 frequencies and 1 variances"),
+        ({"variances": ()}, "no variances of waves"),
         ({"frequency": (0.0, 1.0)}, r"frequency = 0.0 rad/s"),
-        ({"variance": (0.1, 0.0)}, r"variance = 0.0 m²/s²"),
+        ({"variances": ((0.1, 0.0),)}, r"variance = 0.0 m²/s²"),
         ({"build_up": -1.0}, r"build_up = -1.0 s"),
         ({"build_up": math.inf}, r"build_up = inf s"),
     ],
 )
 def test_bad_waves_are_refused(changes, words):
     with pytest.raises(InvalidValue, match=words):
-        ExpectedWaves(**{"frequency": (0.5, 1.0), "variance": (0.1, 0.1), "build_up": 5.0, **changes})
+        ExpectedWaves(**{"frequency": (0.5, 1.0), "variances": ((0.1, 0.1),), "build_up": 5.0, **changes})

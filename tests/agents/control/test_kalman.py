@@ -47,9 +47,7 @@ def test_the_wave_filter_is_the_conditional_mean(build_up):
     see_depth = np.append(np.stack([(1 / exponent).real, -(1 / exponent).imag], axis=1).ravel(), 1.0)
     stirs, rows, readings, noises = [], [], [], []
     for k in range(1, steps + 1):
-        foretold = filtered.rate(np.array([PERIOD]))[0, 0]
         filtered.advance(np.array([rates[k - 1], 0.0]))
-        assert filtered.innovation[0] == pytest.approx(rates[k - 1] - foretold, abs=1e-12)
         filtered.correct(np.array([depths[k - 1], 0.0]) - filtered.heave())
         grow = 2.0 * PERIOD / build_up if k * PERIOD < build_up else 1.0 - np.exp(-2.0 * bank.damping * PERIOD)
         stirred = np.stack([2.0 * variance * grow, np.zeros(3)], axis=1).ravel()
@@ -74,6 +72,75 @@ def test_the_wave_filter_is_the_conditional_mean(build_up):
         (around[1] - around[0]) / (2.0 * step), abs=1e-6
     )
     assert filtered.heave()[1] == 0.0  # the other row's readings were all zero
+
+
+@pytest.mark.parametrize("build_up", [1.0, 0.0], ids=["from rest", "moves already"])
+def test_kinds_of_sea_count_by_the_likelihood_of_all_readings_at_the_height_that_suits_each_best(build_up):
+    kinds = ((0.02, 0.2, 0.07), (0.2, 0.02, 0.01), (0.01, 0.03, 0.2))
+    steps, rng = 40, np.random.default_rng(5)
+    noise, damping = 1e-3, 0.05
+    waves = ExpectedWaves(frequency=WAVES.frequency, variances=kinds, build_up=build_up)
+    bank = WaveBank(waves=waves, rate_noise=noise, depth_noise=np.inf, damping=damping, offset_drift=0.0)
+    readings = 0.4 * np.cos(0.8 * PERIOD * np.arange(1, steps + 1)) + 0.02 * rng.normal(size=steps)
+    filtered = WaveFilter(1, PERIOD, 1, bank)
+    for reading in readings:
+        filtered.advance(np.array([reading]))
+    # Covariance of all readings at once: each oscillator is a damped, turning, stirred pair of its own.
+    log_likelihood, alone = [], []
+    for variance in kinds:
+        covariance = noise**2 * np.eye(steps)
+        for omega, size in zip(WAVES.frequency, variance, strict=True):
+            turn = np.exp(-damping * PERIOD) * rotation(omega * PERIOD)
+            state = np.eye(2) * (0.0 if build_up else size)
+            states = []
+            for k in range(1, steps + 1):
+                grow = 2.0 * PERIOD / build_up if k * PERIOD < build_up else 1.0 - np.exp(-2.0 * damping * PERIOD)
+                state = turn @ state @ turn.T + np.diag([2.0 * size * grow, 0.0])
+                states.append(state)
+            for j in range(steps):
+                ahead = states[j]
+                for i in range(j, steps):
+                    covariance[i, j] += ahead[0, 0]
+                    if i > j:
+                        covariance[j, i] += ahead[0, 0]
+                    ahead = turn @ ahead
+        height = readings @ np.linalg.solve(covariance, readings) / steps
+        log_likelihood.append(-0.5 * (steps * np.log(height) + np.linalg.slogdet(covariance)[1]))
+        one = WaveFilter(1, PERIOD, 1, replace(bank, waves=replace(waves, variances=(variance,))))
+        for reading in readings:
+            one.advance(np.array([reading]))
+        alone.append(one.path(np.array([1.0]))[0, 0])
+    likelihood = np.exp(np.array(log_likelihood) - max(log_likelihood))
+    assert filtered.probability[0] == pytest.approx(likelihood / likelihood.sum(), rel=1e-4, abs=1e-12)
+    assert filtered.path(np.array([1.0]))[0, 0] == pytest.approx(filtered.probability[0] @ alone, rel=1e-9)
+
+
+def test_a_kind_of_sea_is_found_out_and_foretold_as_if_it_were_known():
+    frequency = tuple(np.linspace(0.4, 1.4, 21))
+    kinds = tuple(tuple(1e-4 + 0.05 * np.exp(-(((np.array(frequency) - f) / 0.08) ** 2))) for f in (0.6, 0.8, 1.0, 1.2))
+    waves = ExpectedWaves(frequency=frequency, variances=kinds, build_up=0.0)
+    rng, rows = np.random.default_rng(3), 40
+    phase, size = rng.uniform(0.0, 2.0 * np.pi, (rows, 21)), np.sqrt(2.0 * np.array(kinds[2]))
+
+    def heave_rate(time):
+        return (size * np.cos(np.array(frequency) * time + phase)).sum(axis=1)
+
+    bank = WaveBank(waves=waves, rate_noise=0.005, depth_noise=np.inf)
+    mixed, told = (
+        WaveFilter(rows, PERIOD, 1, bank),
+        WaveFilter(rows, PERIOD, 1, replace(bank, waves=replace(waves, variances=kinds[2:3]))),
+    )
+    for k in range(400):
+        for each in (mixed, told):
+            each.advance(heave_rate(k * PERIOD))
+    assert np.median(mixed.probability[:, 2]) > 0.95
+    ahead = np.array([3.0])
+    truth = heave_rate(399 * PERIOD + 3.0)
+    missed = [np.sqrt(np.mean((each.rate(ahead)[0] - truth) ** 2)) for each in (mixed, told)]
+    assert missed[0] < 1.05 * missed[1]
+    mixed.start(np.array([1]))
+    assert mixed.probability[1] == pytest.approx(np.full(4, 0.25))
+    assert mixed.probability[0, 2] > 0.5
 
 
 def rotation(angle):

@@ -73,7 +73,7 @@ def test_an_agent_comes_back_from_its_folder_as_it_was(observation, action, tmp_
     [
         ({"sha256": "0" * 64}, "does not match the sha256"),
         ({"format": 99}, "format = 99"),
-        ({"format": 2}, "this version reads format 3"),
+        ({"format": 3}, "this version reads format 4"),
         ({"action": "force"}, r"\[action\] force not in literal"),
         ({"waves": {**asdict(WAVES), "build_up": -1.0}}, "build_up = -1.0 s"),
         ({"hidden": "8"}, r"\[hidden\] '8': must be of type int"),
