@@ -16,7 +16,7 @@ class Options(ppo.Options):
 
     action: Action = "predictive"
     """As for the other agents."""
-    timesteps: int = 2_000_000
+    timesteps: int = 1_500_000
     """Control steps to learn from, over all rows."""
     practice: int = 400
     """Learn from so many scenarios, in half of which the winch saturates."""
