@@ -34,6 +34,8 @@ class Options(RunOptions, HeldOut):
     """Policies, and the held-out scenarios that they meet."""
 
     policies: tuple[str, ...] = (
+        "predictive-ppo",
+        "predictive-ppo-sensors",
         "ppo",
         "sac",
         "ppo-sensors",

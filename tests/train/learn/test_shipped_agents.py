@@ -22,10 +22,11 @@ EXACT = {"drive map in real time": 1e-10}
 """Relative, where all else is exact: the magnitude of a complex number rounds by its place in an array."""
 POLICIES = choose_all(
     [
-        *(str(RESULTS / "agents" / name) for name in ("ppo", "sac", "ppo-sensors", "sac-sensors")),
+        *(str(folder) for folder in sorted((RESULTS / "agents").iterdir())),
         str(RESULTS / "drive-map"),
         "feed-forward + feedback (state)",
         "feed-forward + feedback",
+        "predictive control (state)",
         "predictive control",
         "inverse dynamics",
         "output zero",
@@ -45,7 +46,7 @@ def committed():
 
 
 def test_all_seeds_are_there():
-    assert len(POLICIES) == 4 * 5 + 8
+    assert len(POLICIES) == 6 * 5 + 9
     assert {spec.name for spec in POLICIES} <= set(committed())
 
 
