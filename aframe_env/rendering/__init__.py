@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from gymnasium.error import DependencyNotInstalled
 
 if TYPE_CHECKING:
+    from aframe_env.rendering.painter import Painter
     from aframe_env.rendering.renderer import Renderer
     from aframe_env.simulation import Simulation
 
@@ -17,12 +18,27 @@ def open_renderer(simulation: Simulation) -> Renderer:
 
     Raises ``DependencyNotInstalled`` where pygame is missing.
     """
+    _require_pygame()
+    from aframe_env.rendering.renderer import Renderer
+
+    return Renderer(simulation)
+
+
+def open_painter(size: tuple[int, int], legend: tuple[str, str]) -> Painter:
+    """Return a painter of scenes: of pictures ``size`` pixels wide and high, ``legend`` at the chart's two curves.
+
+    Raises ``DependencyNotInstalled`` where pygame is missing.
+    """
+    _require_pygame()
+    from aframe_env.rendering.painter import Painter
+
+    return Painter(size, legend)
+
+
+def _require_pygame() -> None:
     # A greeting on standard output at import has no place in the output of who imports us.
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     try:
         import pygame  # noqa: F401
     except ImportError as error:
         raise DependencyNotInstalled("render() needs pygame: pip install 'aframe-heave[render]'") from error
-    from aframe_env.rendering.renderer import Renderer
-
-    return Renderer(simulation)

@@ -40,9 +40,9 @@ class Canvas:
         self.size = (width, height)
         self._fine = pygame.Surface((width * _FINENESS, height * _FINENESS), 0, 32)
 
-    def picture(self) -> pygame.Surface:
-        """Return the picture, one pixel a pixel."""
-        return pygame.transform.smoothscale(self._fine, self.size)
+    def picture(self, size: tuple[int, int] | None = None) -> pygame.Surface:
+        """Return the picture, one pixel a pixel, or stretched to ``size`` pixels."""
+        return pygame.transform.smoothscale(self._fine, size or self.size)
 
     @contextmanager
     def within(self, box: Box) -> Iterator[None]:

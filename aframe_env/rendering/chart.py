@@ -1,4 +1,4 @@
-"""Strip chart of the depth error and, beside it, of the pulley's heave."""
+"""Strip chart of the depth error and, beside it, of the pulley's heave or the depth error with the drum still."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ _MARGINS: Final = (52.0, 34.0, 18.0, 24.0)
 """Margins from the card's left, top, right and bottom edges to the curves, pixels."""
 
 
-def draw_chart(canvas: Canvas, box: Box, time: float, history: FloatArray) -> None:
-    """Draw the card; ``history`` has lines of time [s], depth error and heave of the pulley [m]."""
+def draw_chart(canvas: Canvas, box: Box, time: float, history: FloatArray, legend: tuple[str, str]) -> None:
+    """Draw the card; ``history`` has lines of time [s] and of two curves [m], the depth error and what is beside it."""
     left, top, width, height = box
     canvas.box(box, palette.CARD, radius=8.0, edge=palette.EDGE)
     x, y = left + _MARGINS[0], top + _MARGINS[1]
@@ -27,7 +27,7 @@ def draw_chart(canvas: Canvas, box: Box, time: float, history: FloatArray) -> No
     limit = min(round_limit(float(np.max(np.abs(shown[:, 1:]), initial=0.0))), 100.0)
     middle, tall = y + 0.5 * plot[3], 0.5 * plot[3] / limit
 
-    _draw_legend(canvas, left, top)
+    _draw_legend(canvas, left, top, legend)
     for share in (-1.0, -0.5, 0.0, 0.5, 1.0):
         level = middle - share * limit * tall
         canvas.line([(x, level), (x + plot[2], level)], palette.EDGE if share == 0.0 else palette.GRID, 1.0)
@@ -46,11 +46,8 @@ def draw_chart(canvas: Canvas, box: Box, time: float, history: FloatArray) -> No
                 canvas.circle(curve[-1], thickness + 1.8, colour)
 
 
-def _draw_legend(canvas: Canvas, left: float, top: float) -> None:
+def _draw_legend(canvas: Canvas, left: float, top: float, legend: tuple[str, str]) -> None:
     place = left + _MARGINS[0]
-    for text, colour, bold in (
-        ("Depth error of the load", palette.ERROR, True),
-        ("Heave of the pulley", palette.HEAVE, False),
-    ):
+    for text, colour, bold in zip(legend, (palette.ERROR, palette.HEAVE), (True, False), strict=True):
         canvas.line([(place, top + 17.0), (place + 18.0, top + 17.0)], colour, 2.5)
         place += 26.0 + canvas.text(text, (place + 26.0, top + 17.0), bold=bold) + 28.0

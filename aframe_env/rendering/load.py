@@ -29,7 +29,17 @@ def draw_load(canvas: Canvas, place: FloatArray, width: float) -> None:
         canvas.line([(x, top + 2.0), (x, top + height - 2.0)], palette.LOAD_SHADE, max(1.0, 0.03 * width))
 
 
-def draw_magnified(canvas: Canvas, box: Box, ship_scale: float, scene: Scene, history: FloatArray) -> None:
+def draw_ghost(canvas: Canvas, place: FloatArray, width: float) -> None:
+    """Draw the load of the drum that stands still, as an outline about the pixel ``place``."""
+    across, up = 0.5 * width, 0.28 * width
+    corners = np.asarray(place) + np.array([[-across, -up], [across, -up], [across, up], [-across, up]])
+    canvas.polygon(corners, palette.HEAVE, opacity=0.25)
+    canvas.line([*corners, corners[0]], palette.HEAVE, max(1.2, 0.022 * width))
+
+
+def draw_magnified(
+    canvas: Canvas, box: Box, ship_scale: float, scene: Scene, history: FloatArray, still: Scene | None = None
+) -> None:
     """Draw a card with the load, its target level and a ruler; ``ship_scale`` is the ship's, pixels per metre."""
     left, top, width, height = box
     canvas.box(box, palette.CARD, radius=8.0, edge=palette.EDGE)
@@ -45,11 +55,16 @@ def draw_magnified(canvas: Canvas, box: Box, ship_scale: float, scene: Scene, hi
     sea = (left + 10.0, top + 34.0, width - 20.0, height - 44.0)
     canvas.gradient(sea, palette.NEAR_WATER, palette.DEEP_WATER)
     recent = history[history[:, 0] >= scene.time - MEMORY, 1]
-    limit = min(round_limit(float(np.max(np.abs([*recent, error])))), 100.0)
+    # Beside the load with the drum still there is one scale for all the time that the chart has: it hardly changes.
+    shown = recent if still is None else history[:, 1:].ravel()
+    limit = min(round_limit(float(np.max(np.abs([*shown, error])))), 100.0)
     view = View((sea[0] + 0.5 * (sea[2] + _RULER), sea[1] + 0.5 * sea[3]), (0.5 * sea[3] - _MARGIN) / limit)
     with canvas.within(sea):
-        _draw_range(canvas, view, sea, recent, limit)
+        if still is None:
+            _draw_range(canvas, view, sea, recent, limit)
         _draw_ruler(canvas, view, sea, limit)
+        if still is not None:
+            _draw_still(canvas, view, sea, still, limit)
         _draw_error(canvas, view, sea, scene, limit)
     written = canvas.text("Load", (left + 14.0, top + 17.0), size=13, bold=True)
     times = view.scale / ship_scale
@@ -85,6 +100,13 @@ def _draw_ruler(canvas: Canvas, view: View, sea: Box, limit: float) -> None:
                 f"{level:+.3g}" if tick else "0", (x - 10.0, y), size=10, colour=palette.FOAM, anchor="midright"
             )
     canvas.text("m", (x - 10.0, sea[1] + 11.0), size=10, colour=palette.FOAM, anchor="midright")
+
+
+def _draw_still(canvas: Canvas, view: View, sea: Box, still: Scene, limit: float) -> None:
+    place = view.pixels([0.0, 0.0, max(-1.12 * limit, min(still.depth_error, 1.12 * limit))])
+    canvas.line([(place[0], sea[1] - 4.0), (place[0], place[1] - 0.28 * 92.0)], palette.HEAVE, 1.5)
+    draw_ghost(canvas, place, 92.0)
+    canvas.text("drum still", (place[0] - 54.0, place[1]), size=11, colour=palette.HEAVE, anchor="midright")
 
 
 def _draw_error(canvas: Canvas, view: View, sea: Box, scene: Scene, limit: float) -> None:

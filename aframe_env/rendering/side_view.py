@@ -8,7 +8,7 @@ import numpy as np
 
 from aframe_env.rendering import palette
 from aframe_env.rendering.canvas import Box, Canvas, text_width
-from aframe_env.rendering.load import draw_load
+from aframe_env.rendering.load import draw_ghost, draw_load
 from aframe_env.rendering.palette import Colour
 from aframe_env.rendering.rope import draw_gap, draw_hanging, draw_hoist
 from aframe_env.rendering.scene import Scene
@@ -32,8 +32,8 @@ _NEAR, _FAR = -11.0, 16.0
 """Ends of the sea along y, towards the onlooker and away, m."""
 
 
-def draw_side_view(canvas: Canvas, box: Box, scene: Scene) -> tuple[float, float]:
-    """Draw the side view; return the pixel about which the load is seen."""
+def draw_side_view(canvas: Canvas, box: Box, scene: Scene, still: Scene | None = None) -> tuple[float, float]:
+    """Draw the side view, and the load of ``still`` beside its own; return the pixel about which the load is seen."""
     left, top, width, height = box
     view = View((left + width - _AFT, top + _ABOVE), scale_of(scene), _RECESSION)
     upper = (left, top, width, height - _BELOW)
@@ -53,7 +53,7 @@ def draw_side_view(canvas: Canvas, box: Box, scene: Scene) -> tuple[float, float
         draw_hanging(canvas, view.pixels(scene.pulley), _on_rope(view, scene, cut), scene)
     lower = (left, top + upper[3], width, _BELOW)
     with canvas.within(lower):
-        place = _draw_depth(canvas, lower, view, scene)
+        place = _draw_depth(canvas, lower, view, scene, still)
     with canvas.within(box):
         gap = (left, cut - 0.5 * _GAP, width, _GAP)
         draw_gap(canvas, gap, _on_rope(view, scene, cut)[0], float(place[0]), scene)
@@ -98,19 +98,24 @@ def _draw_pulley_heave(canvas: Canvas, view: View, box: Box, scene: Scene) -> No
     canvas.text(f"{scene.pulley_heave:+.2f} m", words, size=11, bold=True)
 
 
-def _draw_depth(canvas: Canvas, box: Box, view: View, scene: Scene) -> FloatArray:
+def _draw_depth(canvas: Canvas, box: Box, view: View, scene: Scene, still: Scene | None) -> FloatArray:
     """Draw the load about its target level, at the ship's scale; return the load's pixel."""
     left, top, width, height = box
     canvas.gradient(box, palette.DEEP_WATER, (4, 22, 38))
     target = top + 0.56 * height
     reach = 0.5 * height - 16.0
-    error = max(-reach, min(view.scale * scene.depth_error, reach))
+
+    def level(of: Scene) -> float:
+        return target - max(-reach, min(view.scale * of.depth_error, reach))
+
     x = min(max(float(view.pixels(scene.load)[0]), left + 24.0), left + width - 24.0)
-    place = np.array([x, target - error])
+    place = np.array([x, level(scene)])
     canvas.dashes((left, target), (left + width, target), palette.TARGET, 1.2)
     slope = _on_rope(view, scene, 0.0) - _on_rope(view, scene, 1.0)
     if not scene.parted:
         draw_hanging(canvas, place + slope * (place[1] - top), place, scene)
+    if still is not None:
+        draw_ghost(canvas, np.array([x, level(still)]), 30.0)
     draw_load(canvas, place, 30.0)
     label = f"target level {scene.target_level:.1f} m"
     canvas.text(label, (left + 14.0, target - 10.0), size=11, colour=palette.TARGET)

@@ -38,10 +38,10 @@ class View:
 
 
 def round_limit(value: float) -> float:
-    """Smallest of 0.06, 0.1, 0.2, 0.3, 0.6, 1, 2, 3, 6, ... that is not below ``value``."""
+    """Smallest of 0.06, 0.1, 0.2, 0.3, 0.4, 0.6, 1, 2, 3, 4, 6, ... that is not below ``value``."""
     decade = 0.01
     while True:
-        for factor in (1.0, 2.0, 3.0, 6.0):
+        for factor in (1.0, 2.0, 3.0, 4.0, 6.0):
             limit = factor * decade
             if limit >= max(value, 0.06) * (1.0 - 1e-9):
                 return limit

@@ -13,9 +13,10 @@ import viser.uplot
 from aframe_env.rendering import palette
 from aframe_env.rendering.palette import Colour
 from aframe_env.scenario import ScenarioDistribution
-from train.demo.episode import Episode, Setting, reduction
+from train.demo.episode import Setting, reduction
 from train.demo.policies import Choice
 from train.demo.solids import FloatArray
+from train.shared.episode import Episode
 
 _STILL: Final[Colour] = (112, 152, 186)
 

@@ -22,7 +22,6 @@ from aframe_env.rendering.palette import Colour
 from aframe_env.rendering.scene import Scene
 from aframe_env.rendering.water import Water
 from aframe_env.scenario.crane import Crane
-from train.demo.episode import Moment
 from train.demo.ship_model import (
     LOAD_SIZE,
     PULLEY_RADIUS,
@@ -36,6 +35,7 @@ from train.demo.ship_model import (
     ship_parts,
 )
 from train.demo.solids import FloatArray, grid_faces, ring, sheet, together, tube
+from train.shared.episode import Moment
 
 TARGET: Final = -33.0
 """Height at which the load's target level is drawn, m."""

@@ -12,7 +12,7 @@ import viser
 
 from aframe_env.validation import InvalidValue
 from train.demo.controls import Controls
-from train.demo.episode import RUN_IN, Episode, Setting
+from train.demo.episode import RUN_IN, Setting, begin
 from train.demo.policies import choices
 from train.demo.stage import CAMERAS, FIELD_OF_VIEW, Stage
 from train.shared.cli import program
@@ -110,7 +110,7 @@ class Viewer:
     def _begin(self, setting: Setting, at: float = RUN_IN) -> None:
         """Begin a lift, and pass over its first seconds."""
         self._setting = setting
-        self._episode = Episode(setting)
+        self._episode = begin(setting)
         self._episode.advance_to(at)
         self._time = self._episode.time
         self._stage.begin(self._episode.scenario.crane)

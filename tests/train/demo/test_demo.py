@@ -16,8 +16,9 @@ import pytest
 
 from aframe_env import InvalidValue
 from agents.rollout import run
-from train.demo.episode import RUN_IN, Episode, Setting, between, reduction
+from train.demo.episode import RUN_IN, Setting, begin, reduction
 from train.demo.policies import build, choices
+from train.shared.episode import between
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 LAW = "feed-forward + feedback (state)"
@@ -25,7 +26,7 @@ SETTING = Setting(policy=LAW, sensors=False, hs=3.0, tp=9.0, heading=2.6, load_m
 
 
 def test_both_lifts_are_those_of_the_rollout():
-    episode = Episode(SETTING)
+    episode = begin(SETTING)
     episode.advance_to(20.0)
     history = episode.history()
     assert history[-1, 0] == pytest.approx(20.0)
@@ -36,7 +37,7 @@ def test_both_lifts_are_those_of_the_rollout():
 
 
 def test_between_two_steps_the_ship_moves_evenly():
-    episode = Episode(SETTING)
+    episode = begin(SETTING)
     episode.advance_to(RUN_IN)
     before, after = episode.at(RUN_IN - 0.1).driven, episode.at(RUN_IN).driven
     middle = episode.at(RUN_IN - 0.05).driven
@@ -59,8 +60,8 @@ def test_sensors_decide_what_a_law_is_and_sees():
     assert build(law.text(sensors=True), True)[1] == "sensors"
     assert build(law.text(sensors=False), False)[1] == "state"
     noisy = replace(SETTING, policy=law.text(sensors=True), sensors=True)
-    assert Episode(noisy).on_sensors
-    assert not Episode(SETTING).on_sensors
+    assert begin(noisy).on_sensors
+    assert not begin(SETTING).on_sensors
 
 
 def test_policies_can_be_named_and_those_that_need_the_future_are_refused():
