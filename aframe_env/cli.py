@@ -26,6 +26,7 @@ COMMANDS: Final[Mapping[str, str]] = {
     "vessel": "compute a vessel's response with Capytaine",
     "demo": "watch a lift in the browser, live",
     "render": "draw a picture of the environment",
+    "video": "write an episode as MP4 or GIF",
 }
 """What each command does. ``drive-map`` is ``main()`` of ``train/drive_map.py`` or ``train/drive_map/__main__.py``."""
 

@@ -35,6 +35,12 @@ def held_out_scenarios(source: ScenarioSource, count: int) -> list[Scenario]:
     return drawn_scenarios(source, HELD_OUT_SEED, count)
 
 
+def noise_seeds(noise_seed: int, count: int) -> list[int]:
+    """Return the seeds of the sensors' noise in the first ``count`` scenarios of a series; the same ones, likewise."""
+    seeds: list[int] = np.random.default_rng(noise_seed).integers(2**63, size=count).tolist()
+    return seeds
+
+
 HISTORY = (task.DEPTH_ERROR, task.DRUM_SPEED, task.ROPE_TENSION)
 """Columns of the state that are kept of every control step."""
 BAND = 0.05
@@ -104,7 +110,7 @@ def run(
     # A single scenario stands for all of them: their cranes' winches are alike. It has no sensors of its own.
     config = config.replaced(observation=config.sensors or "state", scenario=scenarios[0])
     simulation = Simulation(rows, config)
-    seeds = np.random.default_rng(noise_seed).integers(2**63, size=rows).tolist()
+    seeds = noise_seeds(noise_seed, rows)
     simulation.reset_rows(np.arange(rows), list(zip(scenarios, seeds, strict=True)))
     policy.reset(scenarios, config.control_period)
     steps = simulation.episode_steps

@@ -66,6 +66,10 @@ def new_file(path: Path, *, overwrite: bool = False) -> Path:
         raise InvalidValue(f"out = {str(path)!r}: is a folder, must be a file")
     if path.exists() and not overwrite:
         raise InvalidValue(f"out = {str(path)!r}: exists; choose another, or pass --overwrite")
+    place = next(each for each in path.absolute().parents if each.exists())
+    if not (place.is_dir() and os.access(place, os.W_OK)):
+        what = "cannot be written to" if place.is_dir() else "is a file"
+        raise InvalidValue(f"out = {str(path)!r}: {str(place)!r} {what}; choose another with --out")
     return path
 
 
