@@ -5,11 +5,12 @@ BIN := .venv/bin
 
 .DEFAULT_GOAL := help
 
-.PHONY: help train demo drives test verify results bench check clean
+.PHONY: help train demo docs drives test verify results bench check clean
 
 help:
 	@echo "make train     learn to hold the load still and compare the agent (some five minutes)"
 	@echo "make demo      watch a lift in the browser, live"
+	@echo "make docs      build the documentation site, build/site/index.html"
 	@echo "make test      run the whole suite (some ten minutes)"
 	@echo "make check     lint, format, layers, types"
 	@echo "make drives | verify | results | bench | clean"
@@ -19,6 +20,10 @@ train: .venv/installed
 
 demo: .venv/installed-demo
 	$(BIN)/python -m train.demo $(ARGS)
+
+docs: .venv/installed-docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "build/site/index.html"
 
 drives: .venv/installed
 	$(BIN)/python -m train.drives $(ARGS)
@@ -70,6 +75,10 @@ bench: .venv/installed-test .venv-peers/installed
 
 .venv/installed-demo: .venv/installed
 	$(BIN)/python -m pip install --disable-pip-version-check -q -c constraints.txt -e '.[demo]'
+	touch $@
+
+.venv/installed-docs: .venv/installed
+	$(BIN)/python -m pip install --disable-pip-version-check -q -c constraints.txt -e '.[docs]'
 	touch $@
 
 .venv/installed-test: .venv/installed
