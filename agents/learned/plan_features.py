@@ -71,7 +71,7 @@ class PlanFeatures:
         self._knows_state = config.sensors is None
         self._weight = np.ones(rows)
         self._planner = Planner(rows, config.control_period, PlanningConfig(sensors=config.sensors, waves=config.waves))
-        self._heave, self._length, self._turn, self._planned = np.zeros((4, rows))
+        self._heave, self._length, self._planned = np.zeros((3, rows))
 
     def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
         """Features (n, F) of the first observations (n, K) of these ``rows``, whose past is forgotten."""
