@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
 import socket
 import subprocess
 import sys
@@ -20,7 +18,6 @@ from train.demo.episode import RUN_IN, Setting, begin, reduction
 from train.demo.policies import build, choices
 from train.shared.episode import between
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 LAW = "feed-forward + feedback (state)"
 SETTING = Setting(policy=LAW, sensors=False, hs=3.0, tp=9.0, heading=2.6, load_mass=6e4, rope_length=500.0, seed=1)
 
@@ -121,28 +118,17 @@ def viewer():
 
 
 @pytest.fixture(scope="module")
-def page(viewer):
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
-    if CHROMIUM is None:
-        pytest.skip("needs Chromium on the path")
-    flags = ["--no-first-run", "--disable-background-networking", "--disable-component-update"]
-    # Without a GPU: the renderer on the processor that Chromium brings.
-    flags += ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
-    if os.geteuid() == 0:
-        flags.append("--no-sandbox")
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=CHROMIUM, args=flags)
-        # A small picture: what is tested here is not how fast a processor draws.
-        opened = browser.new_page(viewport={"width": 640, "height": 400})
-        opened.wrong = []
-        opened.on("pageerror", lambda error: opened.wrong.append(str(error)))
-        opened.asked = []
-        opened.on("request", lambda request: opened.asked.append(request.url))
-        opened.set_default_timeout(120_000)
-        opened.goto(viewer.address)
-        opened.wait_for_selector("text=heave reduction")
-        yield opened
-        browser.close()
+def page(viewer, chromium_in_3d):
+    # A small picture: what is tested here is not how fast a processor draws.
+    opened = chromium_in_3d.new_page(viewport={"width": 640, "height": 400})
+    opened.wrong = []
+    opened.on("pageerror", lambda error: opened.wrong.append(str(error)))
+    opened.asked = []
+    opened.on("request", lambda request: opened.asked.append(request.url))
+    opened.set_default_timeout(120_000)
+    opened.goto(viewer.address)
+    opened.wait_for_selector("text=heave reduction")
+    return opened
 
 
 def figures(page):

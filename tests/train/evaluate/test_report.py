@@ -1,9 +1,7 @@
 import base64
 import gzip
 import json
-import os
 import re
-import shutil
 from collections import Counter
 from dataclasses import replace
 
@@ -27,7 +25,6 @@ from train.evaluate.statistics import Entry, Interval
 STEPS, DURATION, CONTROL_PERIOD = 600, 60.0, 0.1
 TIME = CONTROL_PERIOD * np.arange(STEPS + 1)
 COMMAND = "python -m train.evaluate --policies 'my_module:<b>&law'"
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
 def episodes(error, **changes):
@@ -324,20 +321,6 @@ class Browser:
         before = self.drawn(section)
         act()
         return self.drawn(section) != before
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
-    if CHROMIUM is None:
-        pytest.skip("needs Chromium on the path")
-    flags = ["--disable-gpu", "--no-first-run", "--disable-background-networking", "--disable-component-update"]
-    if os.geteuid() == 0:
-        flags.append("--no-sandbox")
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=CHROMIUM, args=flags)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")

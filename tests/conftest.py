@@ -1,0 +1,40 @@
+"""What tests of several packages share: a browser."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+FLAGS = ("--no-first-run", "--disable-background-networking", "--disable-component-update")
+
+
+@contextmanager
+def browser_with(*flags: str) -> Iterator[Any]:
+    """Start Chromium with these flags, or skip where there is none."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+    if CHROMIUM is None:
+        pytest.skip("needs Chromium on the path")
+    root = ("--no-sandbox",) if os.geteuid() == 0 else ()
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, args=[*FLAGS, *flags, *root])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    with browser_with("--disable-gpu") as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def chromium_in_3d() -> Iterator[Any]:
+    """Without a GPU: the renderer on the processor that Chromium brings."""
+    with browser_with("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist") as browser:
+        yield browser
