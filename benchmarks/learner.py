@@ -1,9 +1,12 @@
-"""Seconds until a learner removes 95 % of the heave: this package's PPO beside the plain way to set them up.
+"""Seconds until a learner is half of the way from the hand-written base to the shipped agent.
 
-``python -m benchmarks.learner``. The plain way is Stable-Baselines3's own, ``MlpPolicy``, on a
-``DummyVecEnv`` of scalar environments behind ``VecNormalize``, with the same hyper-parameters and number of rows. Both
-learn in turn with one thread, and stop when the deterministic agent's median over validation scenarios is there; the
-clock stands still while it is looked at.
+``python -m benchmarks.learner``. Two ways to set PPO up on the agents' interface, with the same features, action,
+reward and horizon: this package's (rows of one simulation, a linear path beside the perceptron) and the plain one of
+Stable-Baselines3 (``MlpPolicy`` on ``make_vec_env`` of ``AgentInterface``). The settings of each are searched for in
+one space with one number of trials, the first of which is the package's own settings; then each learns with seeds that
+no trial had. Both learn in turn with one thread, and stop when the deterministic agent's median heave reduction over
+validation scenarios is there. They are looked at from the start, before anything is learned; the clock stands still
+meanwhile.
 """
 
 from __future__ import annotations
@@ -11,32 +14,45 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import gymnasium
 import numpy as np
+import optuna
 import torch
 from rich.console import Console
 from stable_baselines3 import PPO
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+from stable_baselines3.common.env_util import make_vec_env
 
 import aframe_env  # noqa: F401  (registers the environment)
-from aframe_env.scenario import ScenarioDistribution
-from agents.policy import DrumStill, FloatArray, Knowledge, Policy
+import agents
+from agents import AgentInterface, FeaturePolicy
+from agents.learned.agent import output_zero
+from agents.policy import DrumStill, Policy
 from agents.rollout import run
 from train.learn import ppo
+from train.learn.learner import Search
 from train.learn.run import to_policy
-from train.learn.tune import validation_scenarios
+from train.learn.tune import suggest, validation_scenarios
 from train.shared.cli import parse
 from train.shared.run_folder import user_errors, versions, write_json
 
-LOOKS_EVERY: Final = 16_384
-"""Control steps between two looks."""
+LOOKS_EVERY: Final = 4096
+"""Control steps between two looks, or as many as are collected between two updates."""
+FIRST_SEED: Final = 1000
+"""Seed of the first trial of a search; those of the runs that count begin at 0."""
 
+_SPACE: Final = ppo.SPEC.search
+assert _SPACE is not None
+SPACE: Final = Search(
+    {name: found for name, found in _SPACE.ranges.items() if name != "reward_knee"},
+    {**_SPACE.choices, "n_envs": (16, 32, 64)},
+)
+"""Search space of both set-ups; the reward is the same."""
 
 Setup = Literal["this package", "plain"]
 
@@ -45,13 +61,17 @@ Setup = Literal["this package", "plain"]
 class Options:
     """Targets and limits of the learning."""
 
-    target: float = 0.95
-    """Median heave reduction to reach."""
+    observation: Literal["state", "sensors"] = "sensors"
+    """Observation of the agents."""
+    half_way: float = 0.5
+    """Target, as a share of the way from the median of output zero to that of the shipped agent."""
     scenarios: int = 64
     """Validation scenarios."""
-    limit: float = 600.0
+    limit: float = 150.0
     """Time after which a learner is given up, s."""
-    rounds: int = 3
+    trials: int = 10
+    """Trials of the search for settings of each, the package's own settings included; 1 takes them as they are."""
+    rounds: int = 5
     """Runs of each, with seeds one after another."""
     out: Path = Path("results/benchmark-learner.json")
     """File of the figures."""
@@ -68,7 +88,7 @@ class Outcome:
     """Learning until the target, or until given up."""
     timesteps: int
     reductions: list[float]
-    """Median heave reduction at each look."""
+    """Median heave reduction at each look, the first before any learning."""
     environment: float
     """Share of these seconds in the environment's steps, resets and features among them."""
     updates: float
@@ -92,33 +112,31 @@ class Stopwatch:
             self.seconds += time.perf_counter() - begin
 
 
-class Plain:
-    """Stable-Baselines3's agent on raw observations as a policy."""
+class Course:
+    """Validation scenarios, and the medians of what a learner begins with and what it shall reach."""
 
-    name = "plain"
-    knows = Knowledge.STATE
+    def __init__(self, options: Options) -> None:
+        chosen = ppo.Options(observation=options.observation)
+        self._observation = options.observation
+        self._scenarios = validation_scenarios(chosen.config.source, options.scenarios)
+        self._still = run(DrumStill(), self._scenarios).rms
+        self.output_zero = self.median(output_zero(chosen.features))
+        self.shipped = self.median(agents.load("ppo-sensors" if options.observation == "sensors" else "ppo"))
+        self.target = self.output_zero + options.half_way * (self.shipped - self.output_zero)
 
-    def __init__(self, model: BaseAlgorithm, normalise: VecNormalize) -> None:
-        self._model, self._normalise = model, normalise
-
-    def reset(self, scenarios: object, control_period: float) -> None:
-        """Do nothing."""
-
-    def act(self, observation: FloatArray, time: float) -> FloatArray:
-        """Drum speed commands (N,) rad/s."""
-        action, _ = self._model.predict(self._normalise.normalize_obs(observation), deterministic=True)
-        return np.asarray(action[:, 0], dtype=np.float64)
+    def median(self, policy: Policy) -> float:
+        """Median heave reduction of a policy."""
+        left = run(policy, self._scenarios, observation=self._observation).rms
+        return 1.0 - float(np.median(left / self._still))
 
 
 class Clock(BaseCallback):
     """Callback that stops the learner at the target or the limit."""
 
-    def __init__(self, policy: Callable[[], Policy], options: Options) -> None:
+    def __init__(self, policy: Callable[[], Policy], course: Course, limit: float) -> None:
         super().__init__()
-        self._policy, self._options = policy, options
-        self._scenarios = validation_scenarios(ScenarioDistribution(), options.scenarios)
-        self._still = run(DrumStill(), self._scenarios).rms
-        self._looked = 0
+        self._policy, self._course, self._limit = policy, course, limit
+        self._looked = -LOOKS_EVERY
         self.reductions: list[float] = []
         self.seconds = 0.0
         self._since = time.perf_counter()
@@ -126,54 +144,36 @@ class Clock(BaseCallback):
     @property
     def reached(self) -> bool:
         """True if the target was reached."""
-        return bool(self.reductions) and self.reductions[-1] >= self._options.target
+        return bool(self.reductions) and self.reductions[-1] >= self._course.target
 
     def _on_training_start(self) -> None:
         self._since = time.perf_counter()
 
     def _on_step(self) -> bool:
-        return not self.reached and self.seconds < self._options.limit
+        return not self.reached and self.seconds < self._limit
 
     def _on_rollout_start(self) -> None:
-        if self.num_timesteps - self._looked < LOOKS_EVERY:
-            return
-        self._looked = self.num_timesteps
         self.seconds += time.perf_counter() - self._since
-        left = run(self._policy(), self._scenarios).rms / self._still
-        self.reductions.append(float(np.median(1.0 - left)))
+        if self.num_timesteps - self._looked >= LOOKS_EVERY:
+            self._looked = self.num_timesteps
+            self.reductions.append(self._course.median(self._policy()))
         self._since = time.perf_counter()
 
 
-def watch(setup: Setup, seed: int, model: BaseAlgorithm, timesteps: int, clock: Clock) -> Outcome:
-    """Learn until the clock says so."""
-    environment, updates = Stopwatch(model.env, "step"), Stopwatch(model, "train")
-    model.learn(timesteps, callback=clock)
-    return Outcome(
-        setup,
-        seed,
-        clock.reached,
-        clock.seconds,
-        model.num_timesteps,
-        clock.reductions,
-        environment.seconds / clock.seconds,
-        updates.seconds / clock.seconds,
-    )
-
-
-def ours(seed: int, options: Options) -> Outcome:
-    """Learn with this package's PPO."""
-    chosen = ppo.Options(seed=seed)
+def ours(chosen: ppo.Options) -> tuple[BaseAlgorithm, Callable[[], Policy]]:
+    """This package's PPO, and how to take a policy out of it."""
     learner = ppo.build(chosen)
-    clock = Clock(lambda: to_policy(learner, chosen)[0], options)
-    return watch("this package", seed, learner.model, chosen.timesteps, clock)
+    assert isinstance(learner.model, PPO)
+    return learner.model, lambda: to_policy(learner, chosen)[0]
 
 
-def plain(seed: int, options: Options) -> Outcome:
-    """Learn in the plain way."""
-    chosen = ppo.Options(seed=seed)
-    rows = VecNormalize(
-        DummyVecEnv([lambda: gymnasium.make("AFrameHeave-v0", episode_duration=60.0)] * chosen.n_envs),
-        gamma=chosen.gamma,
+def plain(chosen: ppo.Options) -> tuple[BaseAlgorithm, Callable[[], Policy]]:
+    """Stable-Baselines3's own PPO on the agents' interface, and how to take a policy out of it."""
+    interface = replace(chosen.interface, privileged=False)
+    rows = make_vec_env(
+        lambda: AgentInterface(gymnasium.make("AFrameHeave-v0", observation=chosen.observation), config=interface),
+        n_envs=chosen.n_envs,
+        seed=chosen.seed,
     )
     model = PPO(
         "MlpPolicy",
@@ -185,12 +185,63 @@ def plain(seed: int, options: Options) -> Outcome:
         gamma=chosen.gamma,
         gae_lambda=chosen.gae_lambda,
         clip_range=chosen.clip_range,
-        policy_kwargs={"net_arch": [chosen.hidden, chosen.hidden]},
-        seed=seed,
+        policy_kwargs={"net_arch": [chosen.hidden, chosen.hidden], "log_std_init": chosen.log_std_init},
+        seed=chosen.seed,
         device="cpu",
     )
-    clock = Clock(lambda: Plain(model, rows), options)
-    return watch("plain", seed, model, 10**8, clock)
+    return model, lambda: FeaturePolicy(lambda x: model.predict(x, deterministic=True)[0], chosen.features)
+
+
+SETUPS: Final[dict[Setup, Callable[[ppo.Options], tuple[BaseAlgorithm, Callable[[], Policy]]]]] = {
+    "this package": ours,
+    "plain": plain,
+}
+
+
+def learn(setup: Setup, chosen: ppo.Options, course: Course, limit: float) -> Outcome:
+    """Learn until the target or the limit."""
+    model, policy = SETUPS[setup](chosen)
+    environment, updates = Stopwatch(model.env, "step"), Stopwatch(model, "train")
+    clock = Clock(policy, course, limit)
+    model.learn(chosen.timesteps, callback=clock)
+    spent = max(clock.seconds, 1e-9)
+    return Outcome(
+        setup=setup,
+        seed=chosen.seed,
+        reached=clock.reached,
+        seconds=clock.seconds,
+        timesteps=model.num_timesteps,
+        reductions=clock.reductions,
+        environment=environment.seconds / spent,
+        updates=updates.seconds / spent,
+    )
+
+
+def tune(setup: Setup, options: Options, course: Course, console: Console) -> dict[str, Any]:
+    """Search for the settings that reach the target soonest."""
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    defaults = ppo.Options(observation=options.observation)
+    study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=0))
+    study.enqueue_trial({name: getattr(defaults, name) for name in SPACE.names})
+
+    def seconds(trial: optuna.Trial) -> float:
+        chosen = replace(defaults, **suggest(trial, SPACE), seed=FIRST_SEED + trial.number)
+        outcome = learn(setup, chosen, course, options.limit)
+        console.print(f"{setup}, trial {trial.number}: {said(outcome)}")
+        # Those that were given up are ranked by how far they got.
+        return outcome.seconds + (0.0 if outcome.reached else options.limit * (1.0 - max(outcome.reductions)))
+
+    study.optimize(seconds, n_trials=options.trials)
+    return dict(study.best_params)
+
+
+def said(outcome: Outcome) -> str:
+    """Say how a run ended."""
+    end = "reached" if outcome.reached else f"given up at {max(outcome.reductions):.2%}"
+    return (
+        f"{end}, {outcome.seconds:.1f} s, {outcome.timesteps:,} steps; "
+        f"environment {outcome.environment:.0%}, updates {outcome.updates:.0%}"
+    )
 
 
 def main() -> int:
@@ -198,24 +249,31 @@ def main() -> int:
     with user_errors():
         options, console = parse(Options, "benchmarks.learner", __doc__ or ""), Console()
         torch.set_num_threads(1)
+        course = Course(options)
+        console.print(
+            f"output zero {course.output_zero:.2%}, shipped agent {course.shipped:.2%}, target {course.target:.2%}"
+        )
+        settings = {setup: tune(setup, options, course, console) for setup in SETUPS}
+        defaults = ppo.Options(observation=options.observation)
         outcomes = []
         for seed in range(options.rounds):
-            for learn in (ours, plain):
-                outcome = learn(seed, options)
+            for setup in SETUPS:
+                outcome = learn(setup, replace(defaults, **settings[setup], seed=seed), course, options.limit)
                 outcomes.append(outcome)
-                best = max(outcome.reductions, default=0.0)
-                end = "reached" if outcome.reached else f"given up at {best:.1%}"
-                console.print(
-                    f"{outcome.setup}, seed {seed}: {end}, {outcome.seconds:.1f} s, {outcome.timesteps:,} steps; "
-                    f"environment {outcome.environment:.0%}, updates {outcome.updates:.0%}"
-                )
-        mine, theirs = ([o.seconds for o in outcomes if o.setup == setup] for setup in ("this package", "plain"))
-        ratio = float(np.median([t / m for m, t in zip(mine, theirs, strict=True)]))
+                console.print(f"{setup}, seed {seed}: {said(outcome)}")
+        mine, theirs = ([o.seconds for o in outcomes if o.setup == setup] for setup in SETUPS)
+        ratio = float(np.median([t / max(m, 1e-9) for m, t in zip(mine, theirs, strict=True)]))
         write_json(
             options.out,
             {
-                "target": options.target,
+                "observation": options.observation,
+                "output_zero": course.output_zero,
+                "shipped": course.shipped,
+                "target": course.target,
                 "limit_s": options.limit,
+                "trials": options.trials,
+                "settings": settings,
+                "seconds": {setup: float(np.median(s)) for setup, s in zip(SETUPS, (mine, theirs), strict=True)},
                 "ratio": ratio,
                 "ratio_is_a_lower_bound": not all(o.reached for o in outcomes if o.setup == "plain"),
                 "outcomes": [vars(o) for o in outcomes],

@@ -1,18 +1,31 @@
 import json
+from dataclasses import replace
 
 import pytest
 
 from benchmarks import learner
+from train.learn import ppo
 
 
-@pytest.mark.parametrize(("target", "reached"), [(-1e9, True), (1.1, False)])
-def test_both_set_ups_learn_until_the_target_or_the_limit(target, reached, tmp_path, monkeypatch):
-    monkeypatch.setattr(learner, "LOOKS_EVERY", 1)
+def test_a_target_below_output_zero_is_met_before_anything_is_learned(tmp_path, monkeypatch):
     out = tmp_path / "learner.json"
-    tiny = ("--rounds", 1, "--scenarios", 2, "--limit", 1e-3, f"--target={target}", "--out", out)
+    tiny = ("--rounds", 1, "--scenarios", 2, "--half-way=-1e9", "--trials", 1, "--out", out)
     monkeypatch.setattr("sys.argv", ["benchmarks.learner", *map(str, tiny)])
     assert learner.main() == 0
     found = json.loads(out.read_text())
-    assert [o["setup"] for o in found["outcomes"]] == ["this package", "plain"]
-    assert all(o["reached"] is reached and len(o["reductions"]) == 1 for o in found["outcomes"])
-    assert found["ratio_is_a_lower_bound"] is not reached
+    assert [(o["setup"], o["reached"]) for o in found["outcomes"]] == [("this package", True), ("plain", True)]
+    assert all(o["timesteps"] == 64 and len(o["reductions"]) == 1 for o in found["outcomes"])
+    assert not found["ratio_is_a_lower_bound"]
+    assert found["output_zero"] < found["shipped"]
+
+
+@pytest.mark.parametrize("setup", learner.SETUPS)
+def test_a_learner_is_looked_at_from_the_start_and_given_up_at_the_limit(setup):
+    options = learner.Options(half_way=1e9, scenarios=2)
+    few = replace(ppo.Options(observation="sensors"), n_envs=2, n_steps=8, batch_size=16, n_epochs=1)
+    outcome = learner.learn(setup, few, learner.Course(options), limit=1e-3)
+    assert not outcome.reached
+    assert outcome.seconds > 1e-3
+    assert outcome.timesteps == 18
+    assert len(outcome.reductions) == 1
+    assert 0.0 < outcome.environment < 1.0
