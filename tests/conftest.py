@@ -1,11 +1,13 @@
-"""What tests of several packages share: a browser."""
+"""What tests of several packages share: a browser, and processes that end with their test."""
 
 from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
+import signal
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import pytest
@@ -38,3 +40,24 @@ def chromium_in_3d() -> Iterator[Any]:
     """Without a GPU: the renderer on the processor that Chromium brings."""
     with browser_with("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist") as browser:
         yield browser
+
+
+@pytest.fixture
+def start() -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Start processes that hear Ctrl-C, each in a process group of its own that is gone when the test ends."""
+    started: list[subprocess.Popen[str]] = []
+
+    def process(command: list[str], **options: Any) -> subprocess.Popen[str]:
+        # Under nohup, or in a shell's background, SIGINT is ignored, and a process hands that on to its children.
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)
+        try:
+            started.append(subprocess.Popen(command, text=True, start_new_session=True, **options))
+        finally:
+            signal.signal(signal.SIGINT, before)
+        return started[-1]
+
+    yield process
+    for each in started:
+        with suppress(ProcessLookupError):
+            os.killpg(each.pid, signal.SIGKILL)
+        each.communicate()

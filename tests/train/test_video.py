@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import gymnasium
@@ -174,15 +175,15 @@ def test_a_full_disk_leaves_nothing(tmp_path: Path, suffix: str) -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs Ctrl-C as a signal")
-def test_an_interrupted_video_leaves_nothing(tmp_path: Path) -> None:
+def test_an_interrupted_video_leaves_nothing(tmp_path: Path, start: Callable[..., subprocess.Popen[str]]) -> None:
     options = ["--policy", "drum still", "--seconds", "600", "--out", str(tmp_path / "a.gif")]
     command = [sys.executable, "-m", "train.video", *options]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as started:
-        until = time.monotonic() + 120.0
-        while not list(tmp_path.iterdir()) and time.monotonic() < until:
-            time.sleep(0.1)
-        time.sleep(0.5)
-        started.send_signal(signal.SIGINT)
-        _, said = started.communicate(timeout=60.0)
+    started = start(command, stderr=subprocess.PIPE)
+    until = time.monotonic() + 120.0
+    while not list(tmp_path.iterdir()) and time.monotonic() < until:
+        time.sleep(0.1)
+    time.sleep(0.5)
+    started.send_signal(signal.SIGINT)
+    _, said = started.communicate(timeout=60.0)
     assert (started.returncode, said) == (130, "interrupted\n")
     assert list(tmp_path.iterdir()) == []

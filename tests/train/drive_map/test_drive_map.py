@@ -33,11 +33,11 @@ def rows(folder):
             return 0
 
 
-def test_a_build_that_is_killed_goes_on_where_it_was(tmp_path, monkeypatch, capsys):
+def test_a_build_that_is_killed_goes_on_where_it_was(tmp_path, monkeypatch, capsys, start):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-m", "train.drive_map", *arguments(tmp_path)]
     # Python's own resource tracker remarks on the kill.
-    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = start(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     until = time.monotonic() + 120.0
     while rows(tmp_path) < 2 and time.monotonic() < until and process.poll() is None:
         time.sleep(0.02)

@@ -147,13 +147,11 @@ if __name__ == "__main__":
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
-def test_an_interrupted_sweep_loses_only_what_was_in_flight(tmp_path, how):
+def test_an_interrupted_sweep_loses_only_what_was_in_flight(tmp_path, how, start):
     script = tmp_path / "sweep.py"
     script.write_text(SWEEP)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    process = subprocess.Popen(
-        [sys.executable, str(script), str(tmp_path)], env=environment, start_new_session=True, stdout=subprocess.DEVNULL
-    )
+    process = start([sys.executable, str(script), str(tmp_path)], env=environment, stdout=subprocess.DEVNULL)
     # Tasks 3 and 4 begin only when a worker is free: 0, 1 and 2 have then been handed back.
     until = time.monotonic() + 60.0
     while not all((tmp_path / f"begun{n}").exists() for n in range(5)) and time.monotonic() < until:
