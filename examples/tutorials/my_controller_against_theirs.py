@@ -103,8 +103,8 @@ for row in comparison.rows:
 # %% [markdown]
 # ## Pair by pair
 #
-# All have met the same seas with the same noise, so that the difference in each scenario counts, and its interval is
-# far narrower than those above.
+# All have met the same seas with the same noise, so that the difference in each scenario counts: who wins how often
+# says more than two intervals that lie side by side.
 
 # %%
 from train.evaluate.statistics import Interval, reductions
