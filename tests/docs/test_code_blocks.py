@@ -1,0 +1,200 @@
+"""What a reader copies works: code blocks run, and commands are what their own parsers take.
+
+Python runs in small settings (``SMALL``), a command's arguments go through its parser and their own checks, and its
+policies are looked up; then it is stopped. Nothing is skipped: a block in another language has its test elsewhere.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import importlib
+import re
+import runpy
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tyro
+from packaging.requirements import Requirement
+from stable_baselines3 import PPO
+from sybil import Document, Example, Sybil
+from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser
+
+from aframe_env import ScenarioDistribution, TaskConfig, cli
+from agents.policy import DrumStill
+from agents.registry import choose_all
+from agents.rollout import held_out_scenarios, run
+from train.learn.sb3_env import TrainingVecEnv
+
+ROOT = Path(__file__).parents[2]
+TUTORIALS = sorted((ROOT / "docs/tutorials").glob("*.md"))
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+SMALL = {
+    "gpu.md": {'65_536, device="cuda"': '64, device="cpu"', "torch.zeros(65_536": "torch.zeros(64"},
+    "results.md": {"held_out_scenarios(ScenarioDistribution(), 200)": "held_out_scenarios(ScenarioDistribution(), 2)"},
+    "learners.md": {"num_envs=64": "num_envs=2"},
+}
+"""What a page's code says, and what is run for it."""
+ELSEWHERE = {
+    ("scenario-files.md", "toml"): "tests/scenario/test_scenario_docs.py",
+    ("scenario-files.md", "csv"): "tests/scenario/test_scenario_docs.py",
+    ("learners.md", "yaml"): "tests/examples/test_examples.py",
+    ("architecture.md", "text"): "the layers, which lint-imports holds",
+}
+"""Blocks of other languages than Python and the shell, and what tests them."""
+OF_RECIPES = {"aframe a2c", 'python -m train.evaluate --policies "proportional (state)"'}
+"""Commands in the text that are there once a recipe of extend.md has been followed."""
+MY_MODULE = """
+def my_function(observation):
+    return observation[:, 0]
+
+my_law = policy = my_function
+"""
+
+
+class Stopped(Exception):
+    """A command has parsed its arguments."""
+
+
+@pytest.fixture
+def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A reader's working folder: the files that the pages tell him to have, made as they say."""
+    page = (ROOT / "docs/scenario-files.md").read_text("utf-8").partition("### My crane in my seas")[2]
+    (tmp_path / "mine.toml").write_text(re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)[0], "utf-8")
+    for module in ("my_module", "my_agent"):
+        (tmp_path / f"{module}.py").write_text(MY_MODULE, "utf-8")
+    (tmp_path / "my_law.py").write_text("from agents.policy import DrumStill as Ahead\n", "utf-8")
+    shutil.copytree(ROOT / "results/agents/ppo-sensors/seed-0", tmp_path / "runs/mine")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def parsed(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Any]:
+    """Parse a command line by the command's own parser; return its options."""
+    real, parse_plainly = tyro.cli, argparse.ArgumentParser.parse_args
+
+    def stop(kind: Any, *args: Any, **keywords: Any) -> Any:
+        if not isinstance(kind, type):  # tyro calls a function: parse for it, and leave it
+            kind = functools.wraps(kind)(lambda **options: options)
+        raise Stopped(real(kind, *args, **keywords))
+
+    def stop_plain(parser: argparse.ArgumentParser) -> None:
+        raise Stopped(parse_plainly(parser))
+
+    def parse(line: str) -> Any:
+        words = shlex.split(line)
+        while "=" in words[0]:
+            del words[0]
+        program, *arguments = words
+        if program == "aframe":
+            call: Callable[[], object] = cli.main
+        elif arguments[0] == "-m":
+            module, arguments = arguments[1], arguments[2:]
+            package = (ROOT / module.replace(".", "/")).is_dir()
+            call = importlib.import_module(f"{module}.__main__" if package else module).main
+        else:
+            script, arguments = str(ROOT / arguments[0]), arguments[1:]
+            call = functools.partial(runpy.run_path, script, run_name="__main__")
+        with monkeypatch.context() as patch:
+            patch.setattr(tyro, "cli", stop)
+            patch.setattr(argparse.ArgumentParser, "parse_args", stop_plain)
+            patch.setattr(sys, "argv", [program, *arguments])
+            with pytest.raises(Stopped) as stopped:
+                call()
+        options = stopped.value.args[0]
+        if {"evaluate", "train.evaluate"} & set(words[1:3]):
+            choose_all(options.policies)
+        return options
+
+    return parse
+
+
+def blocks(page: Path) -> list[str]:
+    """Languages of the fenced blocks of a page."""
+    return re.findall(r"^ *```(.*)\n(?:.*\n)*?^ *```$", page.read_text("utf-8"), flags=re.MULTILINE)
+
+
+def commands(block: str) -> list[str]:
+    """Command lines of a shell block."""
+    joined = block.replace("\\\n", " ")
+    return [line for line in (each.partition("  #")[0].strip() for each in joined.splitlines()) if line]
+
+
+def test_every_block_has_a_test() -> None:
+    for page in PAGES:
+        languages = set(blocks(page)) - {"python", "sh"}
+        assert languages == {language for name, language in ELSEWHERE if name == page.name}, page
+        prose = re.sub(r"^( *)```.*?^\1```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+        assert not re.search(r"\n\n {4}\S", prose), f"{page}: an indented code block has no language"
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if "python" in blocks(page)], ids=lambda page: page.stem)
+def test_python_runs(page: Path, desk: Path) -> None:
+    if page.name == "gpu.md":
+        pytest.importorskip("rsl_rl", reason="needs the extra cuda")
+    if page.name == "learners.md":
+        PPO("MlpPolicy", TrainingVecEnv(2, TaskConfig(observation="sensors")), device="cpu").save("my_ppo.zip")
+    source = page.read_text("utf-8")
+    for said, small in SMALL.get(page.name, {}).items():
+        assert said in source
+        source = source.replace(said, small)
+    (desk / page.name).write_text(source, "utf-8")
+    document = Sybil([PythonCodeBlockParser()]).parse(desk / page.name)
+    count = evaluate(document)
+    assert count == blocks(page).count("python")
+    if page.name == "extend.md":
+        seas = held_out_scenarios(ScenarioDistribution(), 4)
+        left = run(document.namespace["Proportional"](), seas).rms / run(DrumStill(), seas).rms
+        assert np.median(left) < 0.1
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if "sh" in blocks(page)], ids=lambda page: page.stem)
+def test_commands_are_taken(page: Path, desk: Path, parsed: Callable[[str], Any]) -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    made: set[Path] = set()
+
+    def check(example: Example) -> None:
+        for line in commands(example.parsed):
+            program, *words = shlex.split(line)
+            if program == "make":
+                subprocess.run(["make", "-n", *words], cwd=ROOT, check=True, capture_output=True)
+            elif program == "pip":
+                assert words[0] == "install"
+                assert all(Requirement(word).extras <= set(extras) for word in words[1:])
+            elif program == "xdg-open":
+                assert Path(words[0]).parent in made
+            else:
+                made.add(getattr(parsed(line), "out", None))
+
+    assert evaluate(Sybil([CodeBlockParser("sh", check)]).parse(page)) == blocks(page).count("sh")
+
+
+def test_commands_within_the_text_are_taken(desk: Path, parsed: Callable[[str], Any]) -> None:
+    found = set()
+    for page in [*PAGES, *TUTORIALS]:
+        prose = re.sub(r"^( *)```.*?^\1```$", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+        for span in re.findall(r"`((?:aframe|python -m (?:train|benchmarks)[.\w]*)(?:\s[^`]*)?)`", prose):
+            line = " ".join(span.split())
+            if line != "aframe" and not re.search("…|--help|COMMAND", line):
+                found.add(line)
+    assert len(found) > 30
+    assert found >= OF_RECIPES
+    for line in sorted(found - OF_RECIPES):
+        parsed(line)
+
+
+def evaluate(document: Document) -> int:
+    """Evaluate all examples of a document; return how many there were."""
+    examples = list(document.examples())
+    for example in examples:
+        example.evaluate()
+    return len(examples)
