@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from copy import deepcopy
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -84,15 +85,18 @@ class LearnedPolicy(OnFeatures):
         expected = feature_names(self.card.made_for)
         if self.card.features != expected:
             raise InvalidValue(f"the agent's features are {self.card.features}, this version makes {expected}")
+        # Near the winch's limit a command is as the root of what is asked: in single precision it would depend on
+        # the processor, and on who adds up.
+        self._exact = deepcopy(self.actor).double()
 
     def _output(self, inputs: npt.NDArray[np.float32]) -> FloatArray:
         # In blocks of one size: how a matrix product is summed depends on its shape, and a row must not on the others.
         rows = len(inputs)
-        padded = np.zeros((-(-rows // _BLOCK) * _BLOCK, inputs.shape[1]), dtype=np.float32)
+        padded = np.zeros((-(-rows // _BLOCK) * _BLOCK, inputs.shape[1]))
         padded[:rows] = inputs
         with torch.no_grad():
-            blocks = [self.actor(block) for block in torch.split(torch.from_numpy(padded), _BLOCK)]
-        return np.asarray(torch.cat(blocks)[:rows, 0].double().numpy())
+            blocks = [self._exact(block) for block in torch.split(torch.from_numpy(padded), _BLOCK)]
+        return np.asarray(torch.cat(blocks)[:rows, 0].numpy())
 
 
 def serialise(actor: Actor) -> bytes:
