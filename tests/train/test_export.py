@@ -58,7 +58,7 @@ def first_rows(exported: Exported, count: int) -> tuple[np.ndarray, np.ndarray, 
 def test_a_model_commands_what_python_does(exported: Exported) -> None:
     agreement = check(exported.agent, exported.model, held_out_scenarios(ScenarioDistribution(), 2))
     assert agreement.drum_speed.shape == (600, 2)
-    assert agreement.drum_speed.max() < 1e-6
+    assert agreement.drum_speed.max() < 1e-8
     np.testing.assert_allclose(agreement.rms, agreement.rms_python, rtol=0.05)
 
 
@@ -67,7 +67,7 @@ def test_a_model_is_told_the_crane(exported: Exported) -> None:
     (scenario,) = held_out_scenarios(ScenarioDistribution(), 1)
     winch = Winch(drum_diameter=1.1, max_rope_speed=1.5, max_rope_acceleration=1.2, lag=0.25)
     slow = replace(scenario, crane=Crane(winch=winch, rope=Rope(axial_stiffness=1.2e8)))
-    assert check(exported.agent, exported.model, [slow]).drum_speed.max() < 1e-6
+    assert check(exported.agent, exported.model, [slow]).drum_speed.max() < 1e-8
 
 
 def test_a_model_says_what_it_is(exported: Exported) -> None:
@@ -79,6 +79,8 @@ def test_a_model_says_what_it_is(exported: Exported) -> None:
     assert metadata["sha256"] == exported.agent.card.sha256
     assert json.loads(metadata["inputs"]) == description["inputs"]
     graph = onnx.load(exported.model).graph
+    # A constant in single precision would be a number of a formula that was rounded on the way.
+    assert onnx.TensorProto.FLOAT not in {each.data_type for each in graph.initializer}
     for values, described in ((graph.input, description["inputs"]), (graph.output, description["outputs"])):
         assert [value.name for value in values] == [tensor["name"] for tensor in described]
         for value, tensor in zip(values, described, strict=True):

@@ -125,6 +125,20 @@ class FullState(nn.Module):
 class Sensed(nn.Module):
     """``KalmanObserver``: the wave filter of each kind of sea, and the filter of the load on its rope."""
 
+    _transition_re: torch.Tensor
+    _transition_im: torch.Tensor
+    _told_re: torch.Tensor
+    _told_im: torch.Tensor
+    _rate_gain_re: torch.Tensor
+    _rate_gain_im: torch.Tensor
+    _depth_gain_re: torch.Tensor
+    _depth_gain_im: torch.Tensor
+    _spread: torch.Tensor
+    _log_spread: torch.Tensor
+    _waved: torch.Tensor
+    _stretch: torch.Tensor
+    _covariance: torch.Tensor
+
     def __init__(self, period: float, sensors: Sensors, waves: ExpectedWaves) -> None:
         super().__init__()
         self._period, self._tension = period, sensors.tension
@@ -193,7 +207,7 @@ class Sensed(nn.Module):
 
         mean_re, mean_im = (probability[:, None] * re).sum(dim=0), (probability[:, None] * im).sum(dim=0)
         told = (self._told_re * mean_re - self._told_im * mean_im).sum(dim=1)
-        of_waves, *rest = told.split(1)
+        of_waves, *rest = torch.split(told, 1)
         heave, rises = of_waves + mean_re[-1:], rest[: self._delay + 1]
         velocity, *accelerations = rest[self._delay + 1 :]
         depth_error = torch.where(begins, zero, heave - below)
@@ -361,7 +375,7 @@ class Controller(nn.Module):
         mass = hoist.weight / GRAVITY
         features = torch.cat(
             [
-                *load_features(torch, seen.z.split(1)),
+                *load_features(torch, torch.split(seen.z, 1)),
                 *seen.pulley,
                 *lift_features(r["pulley_heave"], mass, hoist.rope_length, hoist.frequency),
             ]

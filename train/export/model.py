@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import torch
 from gymnasium.error import DependencyNotInstalled
+from torch.overrides import TorchFunctionMode
 
 from agents.learned.agent import LearnedPolicy
 from train.export.controller import Controller
@@ -18,6 +19,20 @@ if TYPE_CHECKING:
     import onnx
 
 OPSET: Final = 18
+
+
+class _Doubles(TorchFunctionMode):
+    """Make tensors in double precision of the numbers in a formula: the exporter would round them to single."""
+
+    def __torch_function__(
+        self, func: Any, types: Any, args: tuple[Any, ...] = (), kwargs: dict[str, Any] | None = None
+    ) -> Any:
+        doubles = (torch.tensor(arg, dtype=torch.float64) if type(arg) is float else arg for arg in args)
+        named = {
+            name: torch.tensor(arg, dtype=torch.float64) if type(arg) is float else arg
+            for name, arg in (kwargs or {}).items()
+        }
+        return func(*doubles, **named)
 
 
 def description(agent: LearnedPolicy, controller: Controller) -> dict[str, Any]:
@@ -49,7 +64,7 @@ def export(agent: LearnedPolicy) -> tuple[onnx.ModelProto, dict[str, Any]]:
     )
     # The exporter warns of torchvision that is not there, and of its own deprecated parts.
     logging.getLogger("torch.onnx").setLevel(logging.ERROR)
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), _Doubles():
         warnings.simplefilter("ignore")
         program = torch.onnx.export(
             controller,
