@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import csv
 import json
+import os
+import re
+import shutil
+import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -27,6 +31,7 @@ for needed in ("onnx", "onnxscript", "onnxruntime"):
     pytest.importorskip(needed, reason=f"needs the extra onnx: {needed}")
 
 NAN = float("nan")
+EXAMPLE = Path(__file__).parents[2] / "examples" / "deploy"
 
 
 class Exported(NamedTuple):
@@ -171,3 +176,64 @@ def test_bad_input_is_refused_in_a_sentence(
     assert not out.exists()
     with pytest.raises(InvalidValue, match=r"check = -1: must be in \[0, 20000\]"):
         command.Options(agent="ppo", check=-1)
+
+
+def header_folder() -> Path | None:
+    """Where the headers of ONNX Runtime's C interface lie: ORT_INCLUDE, a fetched release, or the system's."""
+    places = [
+        *([Path(os.environ["ORT_INCLUDE"])] if "ORT_INCLUDE" in os.environ else []),
+        *sorted(EXAMPLE.glob("onnxruntime-*/include")),
+        *(Path(prefix, "include", inner) for prefix in ("/usr/local", "/usr") for inner in ("", "onnxruntime")),
+    ]
+    return next((place for place in places if (place / "onnxruntime_c_api.h").is_file()), None)
+
+
+@pytest.fixture(scope="module")
+def lift(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The example in C, built against the library of the Python package."""
+    import onnxruntime
+
+    if shutil.which("make") is None or shutil.which("cc") is None:
+        pytest.skip("needs make and a C compiler")
+    include = header_folder()
+    if include is None:
+        pytest.skip("needs onnxruntime_c_api.h: make -C examples/deploy, or ORT_INCLUDE=FOLDER")
+    libraries = list((Path(onnxruntime.__file__).parent / "capi").glob("libonnxruntime.so*"))
+    if not libraries:
+        pytest.skip("needs libonnxruntime.so in the package onnxruntime")
+    program = tmp_path_factory.mktemp("deploy") / "lift"
+    places = (f"INCLUDE={include}", f"LIBRARY={libraries[0]}", f"OUT={program}")
+    made = subprocess.run(["make", "-C", EXAMPLE, *places], capture_output=True, text=True, check=False)
+    assert made.returncode == 0, made.stderr
+    return program
+
+
+def flown(program: Path, model: Path, episode: Path) -> tuple[subprocess.CompletedProcess[str], np.ndarray]:
+    """Run the example on an episode; what it printed, (steps, 2)."""
+    done = subprocess.run([program, model, episode, "--fast"], capture_output=True, text=True, check=False)
+    return done, np.loadtxt(done.stdout.splitlines(), delimiter=",", ndmin=2)
+
+
+def test_the_example_in_c_commands_what_python_does(exported: Exported, lift: Path) -> None:
+    done, printed = flown(lift, exported.model, exported.folder / command.EPISODE)
+    assert done.returncode == 0, done.stderr
+    _, _, expected = first_rows(exported, 600)
+    np.testing.assert_allclose(printed[:, 0], expected, rtol=0.0, atol=1e-12)
+    assert not printed[:, 1].any()
+    assert re.fullmatch(r"600 steps, 0 late, the worst took \d+\.\d+ ms\n", done.stderr)
+
+
+@pytest.mark.parametrize("row", ["nan,1,1,1,1,1,1,1,1,1,1,1,1,1", "what?", ""], ids=["nan", "word", "empty"])
+def test_the_example_in_c_stops_on_a_row_that_is_broken(
+    exported: Exported, lift: Path, tmp_path: Path, row: str
+) -> None:
+    lines = (exported.folder / command.EPISODE).read_text(encoding="utf-8").splitlines()[:301]
+    lines[200] = row
+    broken = tmp_path / "broken.csv"
+    broken.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    done, printed = flown(lift, exported.model, broken)
+    assert done.returncode == 3
+    assert "step 199: bad readings, safe stop" in done.stderr
+    np.testing.assert_array_equal(printed[:, 1], np.arange(300) >= 199)
+    assert (np.diff(abs(printed[199:, 0])) <= 0.0).all()
+    assert printed[-1, 0] == 0.0
