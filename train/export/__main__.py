@@ -77,9 +77,11 @@ def run(options: Options, console: Console) -> int:
         with console.status(f"checking on {options.check} held-out scenarios"):
             agreement = check(agent, folder / MODEL, scenarios)
         milliseconds = 1e3 * agreement.seconds
+        double, single = agreement.drum_speed, agreement.drum_speed_single
         console.print(
-            f"{agreement.drum_speed.size} steps: the drum's speed differs from Python's by at most "
-            f"{agreement.drum_speed.max():.1e} of the winch's",
+            f"{double.size} steps: the drum's speed differs from Python's by {double.max():.1e} of the winch's at most",
+            f"with Python's network in single precision: by {single.max():.1e} at most, by more than 1e-6 in "
+            f"{(single > 1e-6).mean():.2%} of the steps",
             f"depth error, root mean square: {agreement.rms.mean():.5f} m in the mean, Python by itself "
             f"{agreement.rms_python.mean():.5f} m",
             f"a step takes {np.median(milliseconds):.2f} ms in the median, {milliseconds.max():.2f} ms at most",

@@ -32,7 +32,12 @@ class Agreement:
     """How well a model agrees with Python."""
 
     drum_speed: FloatArray
-    """(steps, N) difference of the drum's speed at the end of a step, as a share of the winch's."""
+    """(steps, N) difference of the drum's speed at the end of a step, as a share of the winch's.
+
+    From Python with its network in double precision, as the model's is.
+    """
+    drum_speed_single: FloatArray
+    """(steps, N) the same, from Python as it is, whose network is in single precision."""
     rms: FloatArray
     """(N,) root mean square depth error under the model, m."""
     rms_python: FloatArray
@@ -82,21 +87,25 @@ def check(agent: LearnedPolicy, model: Path, scenarios: Sequence[Scenario], *, n
     most = np.array([scenario.crane.winch.max_speed for scenario in scenarios])
     told = lifts.told(simulation.observe())
     states = [np.zeros(session.state_size) for _ in scenarios]
-    agent.reset(scenarios, card.control_period)
-    differences = np.empty((simulation.episode_steps, rows))
+    onlookers = (agent.exact(), agent)
+    for onlooker in onlookers:
+        onlooker.reset(scenarios, card.control_period)
+    differences = np.empty((2, simulation.episode_steps, rows))
     for step in range(simulation.episode_steps):
         observation = simulation.observe()
-        agent.act(observation, step * card.control_period)
         readings, commands = lifts.readings(observation), np.empty(rows)
         for row in range(rows):
             commands[row], fault, states[row] = session.step(readings[row], told[row], states[row])
             assert not fault, "the environment keeps its readings within their ranges"
-        asked, given = agent.overrule(commands)
-        differences[step] = abs(asked - given) / most
+        for difference, onlooker in zip(differences, onlookers, strict=True):
+            onlooker.act(observation, step * card.control_period)
+            asked, given = onlooker.overrule(commands)
+            difference[step] = abs(asked - given) / most
         simulation.advance(commands)
     python = run(agent, scenarios, config, noise_seed=noise_seed)
     return Agreement(
-        drum_speed=differences,
+        drum_speed=differences[0],
+        drum_speed_single=differences[1],
         rms=np.sqrt(simulation.results[:, OMEGA1] / simulation.episode_duration),
         rms_python=python.rms,
         seconds=np.array(session.seconds),

@@ -9,7 +9,6 @@ there is no second graph to run first.
 from __future__ import annotations
 
 import math
-from copy import deepcopy
 from dataclasses import dataclass
 from typing import Final
 
@@ -28,8 +27,8 @@ from train.export.interface import Field, Tensor, readings_of, told_of
 
 Values = dict[str, torch.Tensor]
 
-_WAYS: Final = 4096
-_ROUNDS: Final = 4
+_WAYS: Final = 256
+_ROUNDS: Final = 6
 """The command is searched for among so many parts of the range, so many times: 48 bisections' worth."""
 
 
@@ -308,7 +307,7 @@ class Controller(nn.Module):
         card = agent.card
         self.period = card.control_period
         self.readings, self.told = readings_of(card), told_of(card)
-        self._actor, self._action = deepcopy(agent.actor).double(), card.action
+        self._actor, self._action = agent.exact().actor, card.action
         self._observer = (
             FullState(self.period) if card.sensors is None else Sensed(self.period, card.sensors, card.waves)
         )
