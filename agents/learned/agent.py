@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from copy import deepcopy
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -85,13 +86,22 @@ class LearnedPolicy(OnFeatures):
         if self.card.features != expected:
             raise InvalidValue(f"the agent's features are {self.card.features}, this version makes {expected}")
 
+    def exact(self) -> LearnedPolicy:
+        """The same policy with its network in double precision.
+
+        Near the winch's limit a command goes with the root of what is asked of the drum: there the last digit of a
+        network in single precision, which depends on the processor, is seen.
+        """
+        return LearnedPolicy(deepcopy(self.actor).double(), self.card)
+
     def _output(self, inputs: npt.NDArray[np.float32]) -> FloatArray:
         # In blocks of one size: how a matrix product is summed depends on its shape, and a row must not on the others.
         rows = len(inputs)
-        padded = np.zeros((-(-rows // _BLOCK) * _BLOCK, inputs.shape[1]), dtype=np.float32)
-        padded[:rows] = inputs
+        precision = next(self.actor.parameters()).dtype
+        padded = torch.zeros((-(-rows // _BLOCK) * _BLOCK, inputs.shape[1]), dtype=precision)
+        padded[:rows] = torch.from_numpy(inputs)
         with torch.no_grad():
-            blocks = [self.actor(block) for block in torch.split(torch.from_numpy(padded), _BLOCK)]
+            blocks = [self.actor(block) for block in torch.split(padded, _BLOCK)]
         return np.asarray(torch.cat(blocks)[:rows, 0].double().numpy())
 
 

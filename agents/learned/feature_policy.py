@@ -59,6 +59,15 @@ class OnFeatures(ABC):
             inputs = self._features.advance(observation)
         return self._features.command(self._output(inputs))
 
+    def overrule(self, command: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Look on while somebody else gives the commands (N,) rad/s in place of those of the last ``act``.
+
+        Return the drums' speeds (N,) rad/s at the end of the control step under the policy's, and under these.
+        """
+        if not isinstance(self._features, Features):
+            raise InvalidValue(f"{self.name}: has asked for no speed that could be overruled; call act() first")
+        return self._features.overrule(command)
+
     def predict(
         self,
         observation: npt.NDArray[Any] | dict[str, npt.NDArray[Any]],

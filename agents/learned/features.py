@@ -100,6 +100,8 @@ class Features:
         self._observer = observer_for(self._hoists, DAMPING_RATIO, config.sensors, config.waves)
         self._rise, self._turned = np.zeros((2, rows))
         """Rise of the pulleys [m] and turn of the drums [rad] in this control step."""
+        self._speed_before = np.zeros(rows)
+        """Reckoned speed of the drums at its beginning, rad/s."""
 
     def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
         """Features (n, F) of the first observations (n, K) of these ``rows``, whose past is forgotten."""
@@ -116,6 +118,7 @@ class Features:
     def command(self, output: FloatArray) -> FloatArray:
         """Drum speed commands (N,) rad/s for a network's output (N,), in [-1, 1]."""
         winch, period = self._hoists.winch, self._hoists.period
+        self._speed_before = winch.speed.copy()
         if self._action == "speed":
             command = np.clip(output, -1.0, 1.0) * winch.max_speed
             self._turned = winch.turn(command)
@@ -123,6 +126,17 @@ class Features:
         turn = wanted_turn(np, self._rise, output, winch.radius, winch.max_acceleration, period)
         command, self._turned = winch.command(turn)
         return command
+
+    def overrule(self, command: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Reckon with commands (N,) rad/s that somebody else gives in place of the last ones.
+
+        Return the drums' speeds (N,) rad/s at the end of the control step under the last commands, and under these.
+        """
+        winch = self._hoists.winch
+        asked = winch.speed.copy()
+        winch.speed[:] = self._speed_before
+        self._turned = winch.turn(command)
+        return asked, winch.speed.copy()
 
     def _look(self, o: Columns, rows: Rows) -> Float32Array:
         hoists, observer = self._hoists, self._observer
