@@ -51,21 +51,6 @@ def test_a_config_file_repeats_a_run(tmp_path, monkeypatch):
     assert load(tmp_path / "a").card.sha256 == load(tmp_path / "b").card.sha256
 
 
-def test_ctrl_c_keeps_what_was_learned(tmp_path, monkeypatch):
-    learn = ppo.PPO.learn
-
-    def stopping(self, *arguments, **keywords):
-        learn(self, 128)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(ppo.PPO, "learn", stopping)
-    out = tmp_path / "run"
-    assert command(monkeypatch, *TINY, "--out", out) == 130
-    assert load(out).card.timesteps == 128
-    assert json.loads((out / "metrics.json").read_text())["interrupted"] is True
-    assert not (out / "comparison.json").exists()
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
