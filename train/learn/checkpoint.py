@@ -244,7 +244,7 @@ class KeepCheckpoints(BaseCallback):
 
 
 def _storable(array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    array = np.ascontiguousarray(array)
+    array = np.require(array, requirements="C")  # unlike ascontiguousarray, leaves an array of no dimension as it is
     return array.view(np.float64) if np.iscomplexobj(array) else array
 
 

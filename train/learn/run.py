@@ -54,15 +54,20 @@ class ShowReduction(BaseCallback):
         self._task = progress.add_task("learning", total=total, reduction="   -  ")
         self._rows = rows
         self._interval = 64 * rows.num_envs
-        self._next = self._interval
+        self._shown = 0
+
+    def _on_training_start(self) -> None:
+        self._shown = self.num_timesteps // self._interval
 
     def _on_step(self) -> bool:
         return True
 
     def _on_rollout_end(self) -> None:
-        if self.num_timesteps < self._next:
+        # By the steps alone, so that a training that goes on shows what one that was never interrupted does.
+        shown = self.num_timesteps // self._interval
+        if shown == self._shown:
             return
-        self._next = self.num_timesteps + self._interval
+        self._shown = shown
         reduction = self._rows.pop_reduction()
         self.logger.record("rollout/heave_reduction", reduction)
         self._progress.update(
@@ -175,10 +180,12 @@ def _learn(spec: LearnerSpec, options: LearningOptions, opened: Run, console: Co
         learner = spec.build(options)
         learner.rows.reset()
     model = learner.model
-    begun = 0
+    begun, card = 0, None
     if not opened.taken_up:
         checkpoints.remove()
-    elif can_be_kept(learner) and (card := checkpoints.take_up(learner)) is not None:
+    elif can_be_kept(learner):
+        card = checkpoints.take_up(learner)
+    if card is not None:
         begun = model.num_timesteps
         console.print(f"goes on from {begun:,} control steps")
         if card["versions"] != versions():
@@ -203,7 +210,7 @@ def _learn(spec: LearnerSpec, options: LearningOptions, opened: Run, console: Co
         callbacks = CallbackList([ShowReduction(progress, options.timesteps, learner.rows), keep])
         try:
             if isinstance(model, BaseAlgorithm):
-                model.learn(options.timesteps - begun, callback=callbacks, reset_num_timesteps=not begun)
+                model.learn(options.timesteps - begun, callback=callbacks, reset_num_timesteps=card is None)
             else:
                 model.learn(options.timesteps, callback=callbacks)
         except Stopped as signalled:

@@ -25,6 +25,8 @@ from aframe_env.validation import InvalidValue
 from train.shared.cli import program, to_mapping, to_toml
 
 CONFIG: Final = "config.toml"
+_WHERE_AND_HOW: Final = ("out", "overwrite", "resume", "checkpoint_every", "log", "threads")
+"""Options that do not change what is computed."""
 _LOCKS: Final[dict[Path, int]] = {}
 """Handles of the folders that this process has locked."""
 REPORTED_PACKAGES = ("gymnasium", "stable-baselines3", "torch", "numpy", "scipy", "numba", "waveresponse")
@@ -142,8 +144,8 @@ def _recorded(folder: Path) -> dict[str, Any] | None:
 
 
 def _what_counts(options: dict[str, Any]) -> dict[str, Any]:
-    """Options without those that say where and how to run."""
-    return {name: value for name, value in options.items() if name not in ("out", "overwrite", "resume")}
+    """Options without those that do not change what is computed."""
+    return {name: value for name, value in options.items() if name not in _WHERE_AND_HOW}
 
 
 def _lock(folder: Path) -> None:

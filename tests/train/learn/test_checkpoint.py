@@ -61,12 +61,12 @@ def test_a_stopped_training_goes_on_to_the_same_agent(
 
     def stops(self: Checkpoints, learner: Any) -> Path:
         written.append(write(self, learner))
-        if len(written) in (2, 5):
+        if len(written) in (1, 3, 7):
             raise checkpoint.Stopped(signal.SIGTERM)
         return written[-1]
 
     monkeypatch.setattr(Checkpoints, "write", stops)
-    assert [train(spec, options, QUIET) for _ in range(3)] == [143, 143, 0]
+    assert [train(spec, options, QUIET) for _ in range(4)] == [143, 143, 143, 0]
     assert agent(tmp_path / "parts") == agent(tmp_path / "whole")
     assert not (tmp_path / "parts" / FOLDER).exists()
     with pytest.raises(InvalidValue, match=r"this training is finished; pass --overwrite"):
@@ -90,11 +90,20 @@ def stopped_after(count: int, case: str, out: Path, monkeypatch: pytest.MonkeyPa
     return spec, options
 
 
-@pytest.mark.parametrize("damage", ["card", "arrays", "segment", "card is gone", "half-written beside it"])
-def test_a_damaged_checkpoint_is_passed_over(damage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    spec, options = options_of("sac", tmp_path / "whole")
+@pytest.fixture(scope="module")
+def whole_sac(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """Agent of a training that was not interrupted."""
+    spec, options = options_of("sac", tmp_path_factory.mktemp("whole"))
     train(spec, options, QUIET)
+    return agent(options.out)
+
+
+@pytest.mark.parametrize("damage", ["card", "arrays", "segment", "card is gone", "half-written beside it"])
+def test_a_damaged_checkpoint_is_passed_over(
+    damage: str, whole_sac: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     spec, options = stopped_after(7, "sac", tmp_path / "parts", monkeypatch)
+    options = replace(options, checkpoint_every=1e6)
     places = sorted((tmp_path / "parts" / FOLDER).glob("[0-9]*"))
     assert len(places) == 2
     newest = places[-1]
@@ -112,7 +121,7 @@ def test_a_damaged_checkpoint_is_passed_over(damage: str, tmp_path: Path, monkey
     else:
         (newest.parent / f".{int(newest.name) + 3:012d}.1").mkdir()
     assert train(spec, options, QUIET) == 0
-    assert agent(tmp_path / "parts") == agent(tmp_path / "whole")
+    assert agent(tmp_path / "parts") == whole_sac
 
 
 def test_a_replay_is_written_once_and_what_is_overwritten_in_it_goes(
@@ -138,7 +147,7 @@ def test_other_options_are_not_taken_for_the_same_training(tmp_path: Path, monke
 
 
 COMMAND = [
-    *("--timesteps", "6000", "--n-envs", "8", "--n-steps", "16", "--batch-size", "64", "--n-epochs", "2"),
+    *("--timesteps", "4000", "--n-envs", "8", "--n-steps", "16", "--batch-size", "64", "--n-epochs", "2"),
     *("--eval-scenarios", "0", "--checkpoint-every", "0", "--log"),
 ]
 
@@ -159,7 +168,7 @@ def test_kills_at_random_moments_end_with_the_same_agent(tmp_path: Path, start: 
     whole = started(start, tmp_path / "whole")
     assert whole.communicate(timeout=120.0)[1] == ""
     rng = np.random.default_rng(0)
-    for _ in range(3):
+    for _ in range(2):
         process = started(start, tmp_path / "parts")
         wait_for_checkpoints(tmp_path / "parts", 1)
         time.sleep(rng.uniform(0.0, 0.5))
@@ -167,7 +176,7 @@ def test_kills_at_random_moments_end_with_the_same_agent(tmp_path: Path, start: 
         process.communicate()
     said, errors = started(start, tmp_path / "parts").communicate(timeout=120.0)
     assert errors == ""
-    assert "goes on from" in said or "finished" in said
+    assert "goes on from" in said
     assert agent(tmp_path / "parts") == agent(tmp_path / "whole")
 
 

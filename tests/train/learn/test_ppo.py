@@ -4,7 +4,6 @@ import tomllib
 import pytest
 
 from agents.learned.agent import load
-from train.learn import ppo
 from train.learn.run import main
 
 TINY = ("--timesteps", 512, "--n-envs", 4, "--n-steps", 16, "--batch-size", 64, "--n-epochs", 1)
