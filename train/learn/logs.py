@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -11,7 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 from gymnasium.error import DependencyNotInstalled
-from stable_baselines3.common.logger import KVWriter, Logger, configure
+from stable_baselines3.common.logger import CSVOutputFormat, KVWriter, Logger, configure
 
 from aframe_env.validation import InvalidValue
 
@@ -59,15 +60,38 @@ def require_logs(names: Sequence[str]) -> None:
 
 
 @contextmanager
-def open_logger(folder: Path, names: Sequence[str], options: Mapping[str, Any]) -> Iterator[Logger]:
-    """Open a run of every log for a training with these options, whose run folder is ``folder``."""
+def open_logger(folder: Path, names: Sequence[str], options: Mapping[str, Any], begun: int = 0) -> Iterator[Logger]:
+    """Open a run of every log for a training with these options, whose run folder is ``folder``.
+
+    ``begun``: control steps that were learned from before an interruption; their figures stay.
+    """
     with ExitStack() as stack:
+        earlier = _figures_until(begun, folder / "log" / "progress.csv")
         logger = configure(str(folder / "log"), ["csv", *(["tensorboard"] if "tensorboard" in names else [])])
         stack.callback(logger.close)
+        if earlier:
+            _write_again(earlier, logger)
         for name, open_run in _TRACKERS.items():
             if name in names:
                 logger.output_formats.append(Figures(name, stack.enter_context(open_run(folder, options))))
         yield logger
+
+
+def _figures_until(timesteps: int, path: Path) -> list[dict[str, str]]:
+    """Lines of the CSV file of figures up to so many control steps."""
+    if not timesteps or not path.exists():
+        return []
+    with path.open(encoding="utf-8", newline="") as file:
+        lines = [line for line in csv.DictReader(file) if line.get("time/total_timesteps")]
+    return [line for line in lines if int(line["time/total_timesteps"]) <= timesteps]
+
+
+def _write_again(lines: Sequence[Mapping[str, str]], logger: Logger) -> None:
+    """Put lines at the start of the logger's new CSV file."""
+    (output,) = (each for each in logger.output_formats if isinstance(each, CSVOutputFormat))
+    for line in lines:
+        figures = {key: value for key, value in line.items() if value}
+        output.write(figures, dict.fromkeys(figures, ()))
 
 
 def _require_wandb() -> None:

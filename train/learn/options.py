@@ -65,6 +65,11 @@ class LearningOptions(RunOptions):
     known."""
     threads: int = 1
     """Threads of torch; more than one only slows so small a network down."""
+    checkpoint_every: float = 30.0
+    """Time of learning between two checkpoints, s."""
+    resume: Path | None = None
+    """Folder of a training that was interrupted, to go on with; its own options hold. The same command with the same
+    --out goes on, too."""
     log: tuple[str, ...] = ("tensorboard",)
     """Where figures go beside the CSV file: tensorboard, wandb, mlflow, or several of them."""
 
@@ -87,6 +92,7 @@ class LearningOptions(RunOptions):
         require_integer("eval_scenarios", self.eval_scenarios, low=0, high=10**6)
         require_integer("eval_privileged", self.eval_privileged, low=0, high=10**6)
         require_integer("threads", self.threads, low=1, high=256)
+        require_number("checkpoint_every", self.checkpoint_every, "s", low=0.0, high=1e9)
 
     @cached_property
     def config(self) -> TaskConfig:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import json
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -10,19 +10,33 @@ from typing import Final
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.base_class import BaseAlgorithm
+from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 
-from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, serialise
+from aframe_env.validation import InvalidValue
+from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, load, serialise
 from agents.learned.feature_sets import feature_names
 from agents.learned.features import Action
 from train.evaluate.run import evaluate
+from train.learn.checkpoint import Checkpoints, KeepCheckpoints, Stopped, can_be_kept, stop_by_signal
 from train.learn.learner import Learner, LearnerSpec, Rows
 from train.learn.logs import open_logger, require_logs
 from train.learn.options import LearningOptions
 from train.learn.registry import find_learner
-from train.shared.cli import parse, to_mapping
-from train.shared.run_folder import open_run, user_errors, versions, write_atomically, write_json, write_text
+from train.shared.cli import parse, read_options, to_mapping
+from train.shared.run_folder import (
+    CONFIG,
+    Run,
+    open_run,
+    user_errors,
+    versions,
+    write_atomically,
+    write_json,
+    write_text,
+)
 
+METRICS: Final = "metrics.json"
+EVALUATED: Final = "comparison.json"
 AGENT_NAMES: Final[dict[Action, str]] = {
     "speed": "{}",
     "residual": "residual {}",
@@ -40,15 +54,20 @@ class ShowReduction(BaseCallback):
         self._task = progress.add_task("learning", total=total, reduction="   -  ")
         self._rows = rows
         self._interval = 64 * rows.num_envs
-        self._next = self._interval
+        self._shown = 0
+
+    def _on_training_start(self) -> None:
+        self._shown = self.num_timesteps // self._interval
 
     def _on_step(self) -> bool:
         return True
 
     def _on_rollout_end(self) -> None:
-        if self.num_timesteps < self._next:
+        # By the steps alone, so that a training that goes on shows what one that was never interrupted does.
+        shown = self.num_timesteps // self._interval
+        if shown == self._shown:
             return
-        self._next = self.num_timesteps + self._interval
+        self._shown = shown
         reduction = self._rows.pop_reduction()
         self.logger.record("rollout/heave_reduction", reduction)
         self._progress.update(
@@ -95,34 +114,84 @@ def main(name: str) -> int:
         if successor is not None:
             spec = find_learner(successor)
             options = parse(spec.options, spec.command, spec.description)
+        if options.resume is not None:
+            options = _options_of(options.resume, spec)
         return train(spec, options, Console())
 
 
+def _options_of(folder: Path, spec: LearnerSpec) -> LearningOptions:
+    """Options of the training whose folder that is."""
+    config = folder / CONFIG
+    if not config.is_file():
+        raise InvalidValue(f"resume = {str(folder)!r}: no folder of a training, which has {CONFIG}")
+    return replace(read_options(config, spec.options), out=folder)
+
+
 def train(spec: LearnerSpec, options: LearningOptions, console: Console) -> int:
-    """Train, save and compare the agents of all seeds; return the exit status."""
+    """Train, save and compare the agents of all seeds, or go on with that; return the exit status."""
     spec.check(options)
     require_logs(options.log)
     if options.seeds == 1:
         return _train_one(spec, options, console)
-    folder = open_run(options, spec.command).folder
+    opened = open_run(options, spec.command, goes_on=True)
+    opened.record(options)
     for seed in range(options.seed, options.seed + options.seeds):
-        one = replace(options, seed=seed, seeds=1, out=folder / f"seed-{seed}")
+        one = replace(options, seed=seed, seeds=1, out=opened.folder / f"seed-{seed}")
+        if opened.taken_up and _finished(one):
+            console.print(f"{one.out}: finished already")
+            continue
         if status := _train_one(spec, one, console):
             return status
     return 0
 
 
+def _finished(options: LearningOptions) -> bool:
+    """Whether the training of these options ended, its comparison included."""
+    assert options.out is not None
+    return _learned(options.out) and (not options.eval_scenarios or (options.out / EVALUATED).exists())
+
+
+def _learned(folder: Path) -> bool:
+    """Whether the training in a folder came to its end."""
+    metrics = folder / METRICS
+    return metrics.exists() and not json.loads(metrics.read_text(encoding="utf-8"))["interrupted"]
+
+
 def _train_one(spec: LearnerSpec, options: LearningOptions, console: Console) -> int:
-    opened = open_run(options, spec.command)
+    opened = open_run(options, spec.command, goes_on=True)
     folder = opened.folder
-    opened.record(options)
+    if opened.taken_up and _finished(replace(options, out=folder)):
+        raise InvalidValue(f"out = {str(folder)!r}: this training is finished; pass --overwrite to do it again")
     console.print(f"run folder: {folder}")
+    if not (opened.taken_up and _learned(folder)):
+        if not opened.taken_up:
+            opened.record(options)
+        if status := _learn(spec, options, opened, console):
+            return status
+    if options.eval_scenarios:
+        evaluate(load(folder), folder, options.held_out, console)
+    return 0
+
+
+def _learn(spec: LearnerSpec, options: LearningOptions, opened: Run, console: Console) -> int:
+    """Learn from the start or from the newest checkpoint, and save the agent; return the exit status."""
+    folder, checkpoints = opened.folder, Checkpoints(opened.folder)
     with console.status("compiling the engine (about half a minute at the very first start)"):
         learner = spec.build(options)
         learner.rows.reset()
     model = learner.model
+    begun, card = 0, None
+    if not opened.taken_up:
+        checkpoints.remove()
+    elif can_be_kept(learner):
+        card = checkpoints.take_up(learner)
+    if card is not None:
+        begun = model.num_timesteps
+        console.print(f"goes on from {begun:,} control steps")
+        if card["versions"] != versions():
+            console.print("the checkpoint is of other versions: the agent may differ from that of one run")
     begin = time.perf_counter()
-    interrupted = False
+    stopped: Stopped | None = None
     progress = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -131,24 +200,37 @@ def _train_one(spec: LearnerSpec, options: LearningOptions, console: Console) ->
         TimeRemainingColumn(),
         console=console,
     )
-    with open_logger(folder, options.log, to_mapping(options)) as logger, progress:
+    with (
+        stop_by_signal() as stop,
+        open_logger(folder, options.log, to_mapping(options), begun) as logger,
+        progress,
+    ):
         model.set_logger(logger)
+        keep = KeepCheckpoints(checkpoints, learner, options.checkpoint_every, stop)
+        callbacks = CallbackList([ShowReduction(progress, options.timesteps, learner.rows), keep])
         try:
-            model.learn(options.timesteps, callback=ShowReduction(progress, options.timesteps, learner.rows))
-        except KeyboardInterrupt:
-            interrupted = True
+            if isinstance(model, BaseAlgorithm):
+                model.learn(options.timesteps - begun, callback=callbacks, reset_num_timesteps=card is None)
+            else:
+                model.learn(options.timesteps, callback=callbacks)
+        except Stopped as signalled:
+            stopped = signalled
     seconds = time.perf_counter() - begin
     policy, weights = to_policy(learner, options)
     save(folder, policy, weights)
     write_json(
-        folder / "metrics.json",
-        {"timesteps": model.num_timesteps, "training_seconds": round(seconds, 1), "interrupted": interrupted},
+        folder / METRICS,
+        {
+            "timesteps": model.num_timesteps,
+            "training_seconds": round(seconds, 1),
+            "checkpoint_seconds": round(keep.seconds, 1),
+            "interrupted": stopped is not None,
+        },
     )
     console.print(f"agent: {folder / WEIGHTS} after {model.num_timesteps:,} steps in {seconds:.0f} s")
-    if interrupted:
-        console.print("interrupted: what was learned is kept; the comparison was left out")
-        return 130
-    if options.eval_scenarios:
-        with contextlib.suppress(KeyboardInterrupt):
-            evaluate(policy, folder, options.held_out, console)
+    if stopped is not None:
+        what = f"--resume {folder} goes on" if keep.written else "what was learned is kept, and cannot go on"
+        console.print(f"stopped by {stopped}: {what}")
+        return stopped.status
+    checkpoints.remove()
     return 0

@@ -6,7 +6,7 @@ generator, without Gymnasium's face between them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -18,15 +18,19 @@ from stable_baselines3.common.vec_env import VecEnv
 from aframe_env import task
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario
-from aframe_env.simulation import Simulation
+from aframe_env.simulation import RowState, Simulation
 from agents.learned.features import LIMIT, FeatureConfig
 from agents.learned.interface import Cuts, InterfaceConfig, LearnerFeatures
+from train.learn.memory import Memory, into_object, of_object
 from train.learn.options import LearningOptions
 from train.learn.practice import Practice
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 
+
+_OWN: Final = ("_which", "_commands", "_return", "_length", "_error_sum", "_still_sum")
+_SENSED: Final = ("sensed_past", "sensor_errors", "readings")
 
 GROUPS: Final = 8
 """Groups of rows that start together where scenarios are practised on."""
@@ -67,6 +71,8 @@ class TrainingVecEnv(VecEnv):
         """Scenario of ``practice`` that each row runs in."""
         self._simulation = simulation = Simulation(rows, config)
         self._rng = np.random.default_rng(seed)
+        self._drawn_from: list[Mapping[str, Any]] = [self._rng.bit_generator.state] * rows
+        """State of the generator before each row's scenario was drawn."""
         self._commands = np.zeros(rows)
         self._no_infos: list[dict[str, Any]] = [{} for _ in range(rows)]
         self._features = LearnerFeatures(
@@ -164,10 +170,55 @@ class TrainingVecEnv(VecEnv):
     def _draw(self, rows: npt.NDArray[np.int64]) -> list[tuple[Scenario, int]]:
         """Scenarios for these rows, and seeds of their noise."""
         if self._practice is None:
-            return [self._simulation.draw(self._rng) for _ in rows]
+            drawn = []
+            for row in rows.tolist():
+                self._drawn_from[row] = self._rng.bit_generator.state
+                drawn.append(self._simulation.draw(self._rng))
+            return drawn
         self._which[rows] = self._rng.integers(len(self._practice.scenarios), size=len(rows))
         seeds = self._rng.integers(2**53, size=len(rows)).tolist()
         return [(self._practice.scenarios[i], seed) for i, seed in zip(self._which[rows], seeds, strict=True)]
+
+    def memory(self) -> Memory:
+        """Everything that the rows' rest depends on."""
+        simulation, memory = self._simulation, Memory({name: getattr(self, name).copy() for name in _OWN})
+        memory.put("features", of_object(self._features))
+        memory.put("cuts", of_object(self._cuts))
+        memory.values["generator"] = self._rng.bit_generator.state
+        memory.values["drawn_from"] = list(self._drawn_from)
+        rows = [simulation.copy_row(i) for i in range(self.num_envs)]
+        memory.arrays["engine"] = np.stack([row.engine for row in rows])
+        memory.values["steps"] = [row.step for row in rows]
+        sensed = [row.sensors for row in rows if row.sensors is not None]
+        if sensed:
+            for i, name in enumerate(_SENSED):
+                memory.arrays[name] = np.stack([sensors[i] for sensors in sensed])
+            memory.values["noise"] = [sensors[3:] for sensors in sensed]
+        return memory
+
+    def recall(self, memory: Memory) -> None:
+        """Put back what ``memory`` told of rows with the same options."""
+        for name in _OWN:
+            getattr(self, name)[:] = memory.arrays[name]
+        self._drawn_from = list(memory.values["drawn_from"])
+        for i, (engine, step) in enumerate(zip(memory.arrays["engine"], memory.values["steps"], strict=True)):
+            sensors = None
+            if "noise" in memory.values:
+                seed, count = memory.values["noise"][i]
+                sensors = (*(memory.arrays[name][i] for name in _SENSED), seed, count)
+            mesh = self._simulation.config.mesh
+            self._simulation.write_row(i, RowState(self._scenario(i), engine, sensors, step, mesh))
+        self._rng.bit_generator.state = memory.values["generator"]
+        into_object(self._features, memory.under("features"))
+        into_object(self._cuts, memory.under("cuts"))
+
+    def _scenario(self, row: int) -> Scenario:
+        """The scenario of a row, drawn again."""
+        if self._practice is not None:
+            return self._practice.scenarios[int(self._which[row])]
+        self._rng.bit_generator.state = self._drawn_from[row]
+        scenario, _ = self._simulation.draw(self._rng)
+        return scenario
 
     def close(self) -> None:
         """Nothing to close."""

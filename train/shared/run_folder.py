@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
 import platform
 import shlex
 import sys
 import tempfile
+import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from gymnasium.error import DependencyNotInstalled
 from llvmlite.binding import get_host_cpu_name
 
 from aframe_env.validation import InvalidValue
-from train.shared.cli import program, to_toml
+from train.shared.cli import program, to_mapping, to_toml
 
+CONFIG: Final = "config.toml"
+_WHERE_AND_HOW: Final = ("out", "overwrite", "resume", "checkpoint_every", "log", "threads")
+"""Options that do not change what is computed."""
+_LOCKS: Final[dict[Path, int]] = {}
+"""Handles of the folders that this process has locked."""
 REPORTED_PACKAGES = ("gymnasium", "stable-baselines3", "torch", "numpy", "scipy", "numba", "waveresponse")
 
 
@@ -105,17 +112,60 @@ class Run:
     folder: Path
     command: str
     """The command line that made it."""
+    taken_up: bool = False
+    """Whether an earlier run of the same options began to fill it."""
 
     def record(self, options: RunOptions, **more: Any) -> None:
-        """Write config.toml, which ``--config`` reads, and run.json: the command line, ``more``, and the versions."""
-        write_text(self.folder / "config.toml", to_toml(options))
+        """Write run.json: the command line, ``more``, and the versions; then config.toml, which ``--config`` reads."""
         write_json(self.folder / "run.json", {"command": self.command, **more, "versions": versions()})
+        write_text(self.folder / CONFIG, to_toml(options))
 
 
-def open_run(options: RunOptions, name: str) -> Run:
-    """Make the folder of a run of the command of that name."""
+def open_run(options: RunOptions, name: str, *, goes_on: bool = False) -> Run:
+    """Make the folder of a run of the command of that name, for this process alone.
+
+    ``goes_on``: the command goes on with what an earlier run of the same options left, unless it is to be overwritten.
+    """
     default = Path("runs") / f"{name.rpartition('.')[2].replace('_', '-')}-{datetime.now():%Y%m%d-%H%M%S}"
-    return Run(new_folder(options.out or default, overwrite=options.overwrite), command_line(name))
+    folder = options.out or default
+    taken_up = goes_on and not options.overwrite and _recorded(folder) == _what_counts(to_mapping(options))
+    if not taken_up:
+        new_folder(folder, overwrite=options.overwrite)
+    _lock(folder)
+    return Run(folder, command_line(name), taken_up)
+
+
+def _recorded(folder: Path) -> dict[str, Any] | None:
+    """Options that count of the run that began to fill a folder; None if there was none."""
+    try:
+        return _what_counts(tomllib.loads((folder / CONFIG).read_text(encoding="utf-8")))
+    except (OSError, ValueError):
+        return None
+
+
+def _what_counts(options: dict[str, Any]) -> dict[str, Any]:
+    """Options without those that do not change what is computed."""
+    return {name: value for name, value in options.items() if name not in _WHERE_AND_HOW}
+
+
+def _lock(folder: Path) -> None:
+    """Keep other processes from filling the folder as long as this one runs."""
+    if sys.platform == "win32":
+        return  # a folder cannot be locked there
+    import fcntl
+
+    key = folder.resolve()
+    if key in _LOCKS:
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        os.close(handle)
+        if error.errno not in (errno.EAGAIN, errno.EACCES):
+            return  # a disk that knows no locks
+        raise InvalidValue(f"out = {str(folder)!r}: another process is writing into it") from error
+    _LOCKS[key] = handle
 
 
 @contextlib.contextmanager

@@ -4,7 +4,6 @@ import tomllib
 import pytest
 
 from agents.learned.agent import load
-from train.learn import ppo
 from train.learn.run import main
 
 TINY = ("--timesteps", 512, "--n-envs", 4, "--n-steps", 16, "--batch-size", 64, "--n-epochs", 1)
@@ -49,21 +48,6 @@ def test_a_config_file_repeats_a_run(tmp_path, monkeypatch):
     command(monkeypatch, *TINY, "--eval-scenarios", 0, "--eval-privileged", 0, "--out", tmp_path / "a")
     command(monkeypatch, "--config", tmp_path / "a" / "config.toml", "--out", tmp_path / "b")
     assert load(tmp_path / "a").card.sha256 == load(tmp_path / "b").card.sha256
-
-
-def test_ctrl_c_keeps_what_was_learned(tmp_path, monkeypatch):
-    learn = ppo.PPO.learn
-
-    def stopping(self, *arguments, **keywords):
-        learn(self, 128)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(ppo.PPO, "learn", stopping)
-    out = tmp_path / "run"
-    assert command(monkeypatch, *TINY, "--out", out) == 130
-    assert load(out).card.timesteps == 128
-    assert json.loads((out / "metrics.json").read_text())["interrupted"] is True
-    assert not (out / "comparison.json").exists()
 
 
 @pytest.mark.parametrize(
