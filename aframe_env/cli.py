@@ -27,6 +27,7 @@ COMMANDS: Final[Mapping[str, str]] = {
     "demo": "watch a lift in the browser, live",
     "render": "draw a picture of the environment",
     "video": "write an episode as MP4 or GIF",
+    "dataset": "make Minari data sets for offline learning",
     "export": "write an agent as ONNX, for machines without Python",
 }
 """What each command does. ``drive-map`` is ``main()`` of ``train/drive_map.py`` or ``train/drive_map/__main__.py``."""

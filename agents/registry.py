@@ -90,6 +90,8 @@ class PolicySpec:
     """True if building it takes an optimisation for each scenario: it may then run in the first few of them only."""
     control_period: float | None = None
     """Control step that an agent was trained at, s; None: any."""
+    text: str = ""
+    """Name, folder or function that it was chosen by; empty where it was not."""
 
 
 def _drum_still(context: BuildContext) -> Policy:
@@ -223,8 +225,8 @@ def choose_all(texts: Sequence[str]) -> list[PolicySpec]:
 
     Policies of one name are told apart by their seeds or else by the names, folders or functions given.
     """
-    asked = list(dict.fromkeys(each for text in texts for each in _expanded(text)))
-    specs = [choose(text) for text in asked]
+    asked = {each: short for text in texts for each, short in _expanded(text).items()}
+    specs = [replace(choose(text), text=short) for text, short in asked.items()]
     for tell in (lambda text: Path(text).name.replace("-", " "), lambda text: text):
         names = [spec.name for spec in specs]
         specs = [
@@ -234,8 +236,10 @@ def choose_all(texts: Sequence[str]) -> list[PolicySpec]:
     return specs
 
 
-def _expanded(text: str) -> list[str]:
-    return [str(path) for path in learned.seeds(shipped.folder(text))] or [text]
+def _expanded(text: str) -> dict[str, str]:
+    """What a text stands for: texts of single policies, and for each the shortest one."""
+    folders = [str(path) for path in learned.seeds(shipped.folder(text))]
+    return {folder: folder if place else text for place, folder in enumerate(folders)} or {text: text}
 
 
 def as_spec(policy: Policy) -> PolicySpec:

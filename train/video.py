@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -22,14 +22,9 @@ from gymnasium.error import DependencyNotInstalled
 from rich.console import Console
 from rich.progress import track
 
-from aframe_env.config import TaskConfig
 from aframe_env.rendering import open_painter, palette
-from aframe_env.scenario import Scenario
-from aframe_env.simulation import Simulation
 from aframe_env.validation import InvalidValue, require_integer, require_number
-from agents.registry import BuildContext, choose
-from agents.rollout import held_out_scenarios, noise_seeds
-from train.evaluate.run import observation_of
+from train.evaluate.one_episode import EpisodeOptions, begin
 from train.shared.cli import parse
 from train.shared.episode import Episode
 from train.shared.run_folder import new_file, user_errors, write_atomically
@@ -44,25 +39,11 @@ _COLOURS: Final = 255
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class Options(EpisodeOptions):
     """The episode, the part of it that is shown, and the file."""
 
     out: Path | None = None
     """Video to write, .mp4 or .gif; by default runs/episode-DATE-TIME.mp4."""
-    overwrite: bool = False
-    """Write the video even if there is one of that name."""
-    policy: str = "ppo-sensors"
-    """Name, folder of an agent or a drive map, or module:function."""
-    observation: Literal["state", "sensors"] = "state"
-    """Observation of a policy that is made for neither; an agent sees what it was trained on."""
-    scenario: int | Path = 0
-    """Number of a held-out scenario, as in the comparison; or a TOML file with a scenario or a distribution."""
-    seed: int = 0
-    """Draws from the file's distribution, as env.reset(seed=...) does, and the sensors' noise."""
-    start: float = 10.0
-    """Time of the episode at which the video begins, s."""
-    seconds: float = 30.0
-    """Length of the video, s."""
     fps: float | None = None
     """Frames per second; by default 30 in an MP4 and 10 in a GIF, whose frames last whole hundredths of a second."""
     width: int = 960
@@ -71,11 +52,7 @@ class Options:
     """Draw the load with the drum still too."""
 
     def __post_init__(self) -> None:
-        if isinstance(self.scenario, int):
-            require_integer("scenario", self.scenario, low=0, high=19_999)
-        require_integer("seed", self.seed, low=0, high=2**63 - 1)
-        require_number("start", self.start, "s", low=0.0, high=3600.0)
-        require_number("seconds", self.seconds, "s", low=0.1, high=3600.0)
+        super().__post_init__()
         if self.fps is not None:
             require_number("fps", self.fps, "1/s", low=1.0, high=60.0)
         require_integer("width", self.width, low=240, high=1920)
@@ -88,30 +65,6 @@ class Options:
     def size(self) -> tuple[int, int]:
         """Width and height of the picture, pixels: both even, since an MP4 halves them for its colours."""
         return 2 * round(self.width / 2), 2 * round(self.width / 3)
-
-
-def begin(options: Options) -> Episode:
-    """Begin the episode."""
-    spec = choose(options.policy)
-    config = TaskConfig(
-        scenario=options.scenario if isinstance(options.scenario, Path) else None,
-        observation=options.observation,
-        control_period=spec.control_period or TaskConfig.control_period,
-        episode_duration=options.start + options.seconds,
-    )
-    scenario, noise_seed = _drawn(options, config)
-    policy = spec.build(BuildContext(scenarios=[scenario], config=config))
-    # A single scenario has no sensors of its own.
-    seen = config.replaced(observation=observation_of(policy, config))
-    return Episode(policy, seen.replaced(observation=seen.sensors or "state"), scenario, noise_seed)
-
-
-def _drawn(options: Options, config: TaskConfig) -> tuple[Scenario, int]:
-    """Return the scenario and the seed of its sensors' noise."""
-    if isinstance(options.scenario, Path):
-        return Simulation(1, config).draw(np.random.default_rng(options.seed))
-    count = options.scenario + 1
-    return held_out_scenarios(config.source, count)[-1], noise_seeds(options.seed, count)[-1]
 
 
 def frames(episode: Episode, times: Iterable[float], options: Options) -> Iterator[Frame]:
@@ -213,10 +166,9 @@ def run(options: Options, console: Console) -> int:
             raise DependencyNotInstalled(f"{package} is not installed: pip install 'aframe-heave[video]'")
     episode = begin(options)
     fps = writer.rate(options.fps or writer.fps)
-    times = options.start + np.arange(max(1, round(options.seconds * fps))) / fps
 
     def write(path: Path) -> None:
-        shown = track(times.tolist(), description=f"{episode.policy.name}:", console=console)
+        shown = track(options.times(fps), description=f"{episode.policy.name}:", console=console)
         writer.write(path, frames(episode, shown, options), options.size, fps)
 
     write_atomically(out, write)

@@ -24,6 +24,7 @@ import numpy as np
 import pytest
 import tyro
 from packaging.requirements import Requirement
+from rich.console import Console
 from stable_baselines3 import PPO
 from sybil import Document, Example, Sybil
 from sybil.parsers.markdown import CodeBlockParser, PythonCodeBlockParser
@@ -32,6 +33,7 @@ from aframe_env import ScenarioDistribution, TaskConfig, cli
 from agents.policy import DrumStill
 from agents.registry import choose_all
 from agents.rollout import held_out_scenarios, run
+from train import dataset
 from train.learn.sb3_env import TrainingVecEnv
 
 ROOT = Path(__file__).parents[2]
@@ -138,11 +140,16 @@ def test_every_block_has_a_test() -> None:
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if "python" in blocks(page)], ids=lambda page: page.stem)
-def test_python_runs(page: Path, desk: Path) -> None:
+def test_python_runs(page: Path, desk: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if page.name == "gpu.md":
         pytest.importorskip("rsl_rl", reason="needs the extra cuda")
     if page.name == "learners.md":
         PPO("MlpPolicy", TrainingVecEnv(2, TaskConfig(observation="sensors")), device="cpu").save("my_ppo.zip")
+    if page.name == "data.md":
+        pytest.importorskip("minari", reason="needs the extra data")
+        monkeypatch.setenv("MINARI_DATASETS_PATH", str(desk))
+        one = dataset.Options(kinds=("noisy",), observations=("state",), episodes=1)
+        assert dataset.run(one, Console(quiet=True)) == 0
     source = page.read_text("utf-8")
     for said, small in SMALL.get(page.name, {}).items():
         assert said in source

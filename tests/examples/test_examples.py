@@ -4,7 +4,9 @@ import inspect
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
+from rich.console import Console
 
 from agents.learned.features import SENSED_FEATURES
 from examples import learn_cleanrl, learn_sb3
@@ -43,3 +45,25 @@ def test_the_page_s_hyperparameters_are_the_options_defaults(index, options, nam
     assert said["n_timesteps"] == str(options.timesteps)
     for name in ("n_envs", "batch_size", "gamma", "drift_limit", "horizon", *names):
         assert float(said[name]) == getattr(options, name), name
+
+
+@pytest.mark.parametrize("observation", ["state", "sensors"])
+def test_a_clone_is_worth_something(observation, tmp_path, monkeypatch):
+    """An output of zero is a drum that stands still here: it removes nothing."""
+    pytest.importorskip("minari", reason="needs the extra data: minari")
+    pytest.importorskip("h5py", reason="needs the extra data: h5py")
+    from examples import behaviour_cloning
+    from train import dataset
+
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    few = dataset.Options(kinds=("noisy",), observations=(observation,), episodes=24)
+    assert dataset.run(few, Console(quiet=True)) == 0
+    found = behaviour_cloning.clone(f"aframe-heave/{observation}-noisy-v0", "features", scenarios=6)
+    assert np.median(found["clone"]) > 0.8
+    assert np.median(found["expert"]) > np.median(found["clone"])
+    assert (found["still"] == 0.0).all()
+
+
+def test_the_example_of_cloning_is_short():
+    source = Path(__file__).parents[2] / "examples/behaviour_cloning.py"
+    assert len(source.read_text(encoding="utf-8").splitlines()) <= 80

@@ -82,6 +82,12 @@ CAMERAS: Final = {
 """Views by name; the last one, of the stern down to the load, is for a telephone: above the panel."""
 
 
+def aim(camera: viser.CameraHandle | viser.InitialCameraConfig, view: Camera, aspect: float) -> None:
+    """Turn a page's camera, or that of pages to come, to a view, for a picture of this width over height."""
+    camera.fov, camera.near, camera.far = FIELD_OF_VIEW, 1.0, 2000.0
+    camera.position, camera.look_at = view.place(aspect), np.array(view.look_at)
+
+
 class Stage:
     """The scene on a server, which every page that is open shows."""
 
@@ -145,12 +151,10 @@ class Stage:
 
     def view(self, client: viser.ClientHandle, name: str | None = None) -> None:
         """Turn one page's camera to a view; without a name to the one that suits its shape."""
-        camera, aspect = client.camera, client.camera.aspect
-        view = CAMERAS[name or ("Overview" if aspect > 0.9 else "Upright")]
+        aspect = client.camera.aspect
         with client.atomic():
-            camera.up_direction = (0.0, 0.0, 1.0)
-            camera.fov, camera.near, camera.far = FIELD_OF_VIEW, 1.0, 2000.0
-            camera.position, camera.look_at = view.place(aspect), np.array(view.look_at)
+            client.camera.up_direction = (0.0, 0.0, 1.0)
+            aim(client.camera, CAMERAS[name or ("Overview" if aspect > 0.9 else "Upright")], aspect)
 
     def _add(self, under: str, parts: Iterable[Part]) -> None:
         for part in parts:

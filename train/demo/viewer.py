@@ -14,7 +14,7 @@ from aframe_env.validation import InvalidValue
 from train.demo.controls import Controls
 from train.demo.episode import RUN_IN, Setting, begin
 from train.demo.policies import choices
-from train.demo.stage import CAMERAS, FIELD_OF_VIEW, Stage
+from train.demo.stage import CAMERAS, Stage, aim
 from train.shared.cli import program
 
 FRAMES_PER_SECOND: Final = 30.0
@@ -60,9 +60,7 @@ class Viewer:
         self._stage = Stage(self._server)
         self._controls = Controls(self._server, offered, tuple(CAMERAS)[:3])
         self._controls.on_view(self._stage.view)
-        camera = self._server.initial_camera
-        camera.fov, camera.near, camera.far = FIELD_OF_VIEW, 1.0, 2000.0
-        camera.position, camera.look_at = CAMERAS["Overview"].place(1.2), CAMERAS["Overview"].look_at
+        aim(self._server.initial_camera, CAMERAS["Overview"], 1.2)
         self._server.on_client_connect(self._stage.view)
         self._time = 0.0
         self._setting = self._controls.setting()

@@ -152,7 +152,7 @@ def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console) ->
                 config.replaced(observation=observation_of(policy, config)),
                 progress=lambda step, bar=bar: progress.update(bar, completed=step),  # type: ignore[misc]
             )
-            entries.append(Entry(spec.name, policy.knows, episodes))
+            entries.append(Entry(spec.name, policy.knows, episodes, spec.text))
     return Comparison(tuple(entries), tuple(scenarios), config)
 
 

@@ -126,6 +126,8 @@ class Entry:
     policy: str
     knows: Knowledge
     episodes: Episodes
+    text: str = ""
+    """What the policy was chosen by, if it can be chosen again."""
 
 
 def reductions(entry: Entry, still: Episodes) -> FloatArray:

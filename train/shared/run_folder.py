@@ -67,16 +67,19 @@ def new_folder(path: Path, *, overwrite: bool = False) -> Path:
     return path
 
 
-def new_file(path: Path, *, overwrite: bool = False) -> Path:
-    """Return the path of an output file; one that exists is refused unless ``overwrite``."""
+def new_file(path: Path, *, overwrite: bool = False, option: str = "out") -> Path:
+    """Return the path of an output file; one that exists is refused unless ``overwrite``.
+
+    ``option``: its name on the command line.
+    """
     if path.is_dir():
-        raise InvalidValue(f"out = {str(path)!r}: is a folder, must be a file")
+        raise InvalidValue(f"{option} = {str(path)!r}: is a folder, must be a file")
     if path.exists() and not overwrite:
-        raise InvalidValue(f"out = {str(path)!r}: exists; choose another, or pass --overwrite")
+        raise InvalidValue(f"{option} = {str(path)!r}: exists; choose another, or pass --overwrite")
     place = next(each for each in path.absolute().parents if each.exists())
     if not (place.is_dir() and os.access(place, os.W_OK)):
         what = "cannot be written to" if place.is_dir() else "is a file"
-        raise InvalidValue(f"out = {str(path)!r}: {str(place)!r} {what}; choose another with --out")
+        raise InvalidValue(f"{option} = {str(path)!r}: {str(place)!r} {what}; choose another with --{option}")
     return path
 
 

@@ -2,11 +2,13 @@ import base64
 import gzip
 import json
 import re
+import shlex
 from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import tyro
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
@@ -14,8 +16,10 @@ from rich.console import Console
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import ScenarioDistribution
 from agents.policy import Knowledge
-from agents.registry import PolicySpec, choose
+from agents.registry import PolicySpec, choose, choose_all
 from agents.rollout import Episodes, held_out_scenarios
+from train.demo.__main__ import Options as DemoOptions
+from train.evaluate.one_episode import begin
 from train.evaluate.report.data import content, numbers, worst
 from train.evaluate.report.html import figure, percent, write_report
 from train.evaluate.report.remarks import Field, intact, remarks
@@ -269,7 +273,7 @@ def comparison():
     """Eight scenarios: the drum still, a feedback law, and inverse dynamics, which ran in the first three."""
     floor = PolicySpec("inverse <dynamics>", choose("inverse dynamics").build, for_each_scenario=True)
     return run_all(
-        [choose("feed-forward + feedback (state)"), floor],
+        [*choose_all(["feed-forward + feedback (state)"]), floor],
         HeldOut(scenarios=8, privileged=3),
         Console(quiet=True),
     )
@@ -422,6 +426,21 @@ def test_light_and_dark(browser):
 def test_after_all_that_nothing_went_wrong(browser, page):
     assert browser.wrong == []
     assert browser.asked == [page.as_uri()]
+
+
+def test_the_page_says_how_to_watch_an_episode(browser, comparison):
+    """The command, for a policy that was chosen by its name, where the demo's default is another one."""
+    said = browser.page.locator("#episodes code").first.inner_text()
+    name, *arguments = said.split("--record ")
+    assert name == "python -m train.demo "
+    options = tyro.cli(DemoOptions, args=["--record", *shlex.split(arguments[0])])
+    assert (options.policy, options.start, options.seconds) == ("feed-forward + feedback (state)", 0.0, 60.0)
+    title = browser.page.locator("#episodes h3").first.inner_text()
+    assert f"Scenario {options.scenario}:" in title
+    error = comparison.entries[1].episodes.error[options.scenario]
+    episode = begin(options)
+    episode.advance_to(10.0)
+    np.testing.assert_allclose(episode.history()[:, 1], error[:101], atol=1e-5)
 
 
 @pytest.fixture(scope="module")

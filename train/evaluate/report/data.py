@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Final
@@ -11,12 +12,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import welch
 
+from aframe_env.config import TaskConfig
 from agents.policy import FloatArray, Knowledge
 from agents.rollout import Episodes
 from train.evaluate.episode_table import Traits
 from train.evaluate.report.remarks import Field, intact, remarks
 from train.evaluate.run import Comparison
 from train.evaluate.statistics import Entry, Interval, Row, compare, compare_families, families, reductions
+from train.shared.cli import program
 
 Numbers = list[float]
 
@@ -63,6 +66,8 @@ class PolicyCard:
     """Place of the agents that it is one seed of; of all others, their own."""
     seeds: list[int]
     """Places of its seeds; of a single policy, its own."""
+    replay: str
+    """Command that records an episode of it, but for the scenario's number; empty where it cannot be recorded so."""
 
 
 @dataclass(frozen=True)
@@ -232,6 +237,7 @@ def content(comparison: Comparison) -> Content:
                 scenarios=len(means[place]),
                 family=family[place],
                 seeds=[place] if len(unit.members) == 1 else list(range(place + 1, place + 1 + len(unit.members))),
+                replay=_replay(unit.members[0], comparison.config),
             )
             for place, unit in enumerate(units)
         ],
@@ -251,6 +257,18 @@ def content(comparison: Comparison) -> Content:
             else []
             for place, (unit, values) in enumerate(zip(units, means, strict=True))
         ],
+    )
+
+
+def _replay(entry: Entry, config: TaskConfig) -> str:
+    usual = TaskConfig()
+    own_task = config.replaced(scenario=None, observation=usual.observation) != usual or config.source != usual.source
+    if own_task or not entry.text:
+        return ""
+    observation = "state" if config.sensors is None else "sensors"
+    return (
+        f"{program('train.demo')} --record replay.html --policy {shlex.quote(entry.text)} --observation {observation} "
+        f"--start 0 --seconds {config.duration:g} --scenario"
     )
 
 

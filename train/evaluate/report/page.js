@@ -290,6 +290,8 @@
     legend(section.querySelector(".legend"), [...shown.map((history) => history.policy), ...left],
       (policy) => (ran.has(policy) ? percent(ran.get(policy).reduction) : "did not run"));
     element("scenario-traits").textContent = `Scenario ${example.scenario}: ${traits(example.traits)}.`;
+    const best = ran.has(report.policies[report.reference].seeds[0]) ? report.reference : 0;
+    element("scenario-replay").replaceChildren(...replay(best, example.scenario));
     const rows = [
       ["error", "depth error, m", "y", 1],
       ["error", "the same, cm", "y2", 100],
@@ -336,6 +338,17 @@
     });
   }
 
+  // How to watch a policy's episode: a command, where there is one.
+  function replay(policy, scenario) {
+    const command = report.policies[policy].replay;
+    if (!command) return [];
+    const paragraph = Object.assign(document.createElement("p"), { className: "note" });
+    const code = document.createElement("code");
+    code.textContent = `${command} ${scenario}`;
+    paragraph.append(`Watch ${marked(policy)} in it: `, code);
+    return [paragraph];
+  }
+
   function worst() {
     const policy = Number(element("worst-policy").value);
     const holder = element("episodes");
@@ -350,7 +363,7 @@
       const list = document.createElement("ul");
       list.append(...episode.what.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
       const words = document.createElement("div"), body = document.createElement("div");
-      words.append(facts, list);
+      words.append(facts, list, ...replay(policy, episode.scenario));
       const figure = Object.assign(document.createElement("figure"), { className: "plot" });
       figure.setAttribute("aria-label", `Depth error in scenario ${episode.scenario}`);
       body.append(words, figure);
