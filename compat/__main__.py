@@ -16,12 +16,11 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Final
 
 from rich.console import Console
-from rich.markdown import Markdown
 
 from aframe_env.validation import InvalidValue
 from compat.catalogue import LIBRARIES, ROOT, STAGES, Library
@@ -30,14 +29,17 @@ from train.shared.markdown import table
 from train.shared.run_folder import new_folder, user_errors, write_text
 
 PAGE: Final = ROOT / "docs" / "compatibility.md"
-BEGIN, END = "<!-- begin of what `python -m compat --write` writes -->\n", "<!-- end of it -->\n"
+BEGIN, END = "<!-- `make compat ARGS=--write` writes this table -->\n\n", "\n<!-- end of it -->\n"
 LONGEST: Final = 1800.0
 """Time for a script, s; after it, it counts as failed."""
 
 _ABOUT: Final = """
 import importlib.metadata, json, platform, sys
-import gymnasium, aframe_env
-gymnasium.make(aframe_env.ENV_ID).reset(seed=0)
+import gymnasium, aframe_env, agents
+for observation in ("state", "sensors"):
+    env = agents.AgentInterface(gymnasium.make(aframe_env.ENV_ID, observation=observation))
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
 print(json.dumps({
     "python": platform.python_version(),
     "where": aframe_env.__file__,
@@ -56,14 +58,12 @@ class Options:
     environments: Path = Path(".venv-compat")
     """Folder of the environments, one for each requirements file in compat."""
     write: bool = False
-    """Write the table into docs/compatibility.md; needs every library."""
+    """Write the libraries' rows into the table of docs/compatibility.md."""
 
     def __post_init__(self) -> None:
         if not self.libraries:
             names = ", ".join(library.name for library in LIBRARIES)
             raise InvalidValue(f"only = {' '.join(self.only)!r}: no library has it in its name; there are {names}")
-        if self.write and self.only:
-            raise InvalidValue("write: needs a run of every library, without only")
 
     @property
     def libraries(self) -> tuple[Library, ...]:
@@ -91,6 +91,7 @@ class Outcome:
     environment: Environment
     reached: tuple[str, ...]
     seconds: float
+    day: date
     failure: str = ""
     """Last line of what a script said that did not come through."""
 
@@ -99,12 +100,13 @@ class Outcome:
         """The table's row."""
         library, versions = self.library, self.environment.versions
         done = ("yes" if stage in self.reached else "**no**" if stage in library.stages else "" for stage in STAGES)
-        told = "; ".join(filter(None, (f"**{self.failure}**" if self.failure else "", library.remark)))
+        failure = self.failure.replace("|", "/")  # which would end the cell
+        told = "; ".join(filter(None, (f"**{failure}**" if failure else "", library.remark)))
         where = (versions[library.distribution], self.environment.python, versions["gymnasium"])
-        return (library.name, *where, *done, f"{self.seconds:.0f}", told)
+        return (library.name, *where, *done, f"{self.seconds:.0f}", self.day.isoformat(), told)
 
 
-HEADINGS: Final = ("library", "version", "Python", "Gymnasium", *STAGES, "s", "what to know")
+HEADINGS: Final = ("library", "version", "Python", "Gymnasium", *STAGES, "s", "tried on", "what to know")
 
 
 def build_wheel(folder: Path) -> Path:
@@ -160,14 +162,16 @@ def attempt(library: Library, environment: Environment, log: Path, longest: floa
         failure = next(filter(None, reversed(lines)), f"ended with status {status}")
     elif reached != library.stages:
         failure = "ended before it was done"
-    return Outcome(library, environment, reached, seconds, failure)
+    return Outcome(library, environment, reached, seconds, datetime.now(UTC).date(), failure)
 
 
-def report(outcomes: list[Outcome]) -> str:
-    """The run as Markdown."""
-    versions = outcomes[0].environment.versions
-    day = datetime.now(UTC).date().isoformat()
-    return f"Run of {day}, aframe-heave {versions['aframe-heave']}:\n\n" + table(HEADINGS, [o.row for o in outcomes])
+def updated(page: str, outcomes: Sequence[Outcome]) -> str:
+    """Return the page with these outcomes in its table, in the place of what it said of the same libraries."""
+    before, _, rest = page.partition(BEGIN)
+    old, _, after = rest.partition(END)
+    rows = {row[0]: row for line in old.splitlines()[2:] if (row := [cell.strip() for cell in line.split("|")[1:-1]])}
+    rows |= {outcome.library.name: list(outcome.row) for outcome in outcomes}
+    return before + BEGIN + table(HEADINGS, [rows[each.name] for each in LIBRARIES if each.name in rows]) + END + after
 
 
 def run(options: Options, console: Console) -> int:
@@ -182,12 +186,12 @@ def run(options: Options, console: Console) -> int:
         log = folder / f"{library.script.stem}.log"
         console.print(f"{library.name} ...", end=" ")
         outcomes.append(attempt(library, environments[library.environment], log))
-        console.print(f"{outcomes[-1].failure or 'done'} ({outcomes[-1].seconds:.0f} s, {log.relative_to(ROOT)})")
-    text = report(outcomes)
-    console.print(Markdown(text))
-    if options.write:
-        before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-        write_text(PAGE, before + BEGIN + "\n" + text + "\n" + END + rest.partition(END)[2])
+        said = f"{outcomes[-1].failure or 'done'} ({outcomes[-1].seconds:.0f} s, {log.relative_to(ROOT)})"
+        console.print(said, markup=False, highlight=False, soft_wrap=True)
+        if options.write:
+            write_text(PAGE, updated(PAGE.read_text(encoding="utf-8"), outcomes))
+    rows = [outcome.row for outcome in outcomes]
+    console.print(table(HEADINGS, rows), markup=False, highlight=False, soft_wrap=True)
     return int(any(outcome.failure for outcome in outcomes))
 
 

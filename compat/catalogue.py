@@ -43,6 +43,7 @@ LIBRARIES: Final = (
         distribution="rl-zoo3",
         script=SCRIPTS / "learn_rl_zoo3.py",
         beside=(ROOT / "examples" / "rl_zoo3" / "ppo.yml",),
+        remark="`--gym-packages aframe_env`; `rl_zoo3.enjoy` imports requests, which rl-zoo3 does not bring",
     ),
     Library(
         name="CleanRL's style",
@@ -58,13 +59,24 @@ LIBRARIES: Final = (
         stages=("made", "stepped", "saved"),
         remark="`pip install minari[hdf5]`; records data sets, does not train",
     ),
-    Library(name="TorchRL", distribution="torchrl", script=SCRIPTS / "learn_torchrl.py"),
-    Library(name="skrl", distribution="skrl", script=SCRIPTS / "learn_skrl.py"),
+    Library(
+        name="TorchRL",
+        distribution="torchrl",
+        script=SCRIPTS / "learn_torchrl.py",
+        remark="`GymEnv(...).auto_register_info_dict()` has the information in its tensors",
+    ),
+    Library(
+        name="skrl",
+        distribution="skrl",
+        script=SCRIPTS / "learn_skrl.py",
+        remark="learns from Gymnasium's reset step as if it were one: make rows with `autoreset_mode` SAME_STEP",
+    ),
     Library(name="Tianshou", distribution="tianshou", script=SCRIPTS / "learn_tianshou.py"),
     Library(
         name="RLlib",
         distribution="ray",
         script=SCRIPTS / "learn_rllib.py",
         environment="rllib",
+        remark="pins Gymnasium at 1.2.2: an environment of its own; the id with its module, as for all workers",
     ),
 )

@@ -14,7 +14,7 @@ def zoo(command: str, *options: str) -> None:
 
 def main() -> None:
     """Make, step, train, save and load."""
-    zoo("train", "-c", "ppo.yml", "-n", "16384", "--device", "cpu", "--eval-freq", "-1")
+    zoo("train", "-c", "ppo.yml", "-n", "8192", "--device", "cpu", "--eval-freq", "-1")
     print("made", "stepped", "trained", sep="\n")
     assert Path("logs/ppo/AFrameHeave-v0_1/AFrameHeave-v0.zip").is_file()
     zoo("enjoy", "-n", "700", "--no-render", "--device", "cpu")

@@ -13,7 +13,7 @@ def main() -> None:
     """Make, step, train, save and load."""
     tqc = TQC("MlpPolicy", AgentInterface(gymnasium.make("AFrameHeave-v0")), device="cpu", seed=0)
     sensed = make_vec_env("AFrameHeave-v0", n_envs=2, seed=0, env_kwargs={"observation": "sensors"})
-    recurrent = RecurrentPPO("MlpLstmPolicy", sensed, device="cpu", seed=0)
+    recurrent = RecurrentPPO("MlpLstmPolicy", sensed, n_steps=128, device="cpu", seed=0)
     print("made")
 
     readings = sensed.reset()
@@ -24,8 +24,8 @@ def main() -> None:
         assert np.isfinite(rewards).all()
     print("stepped")
 
-    tqc.learn(1000)
-    recurrent.learn(2048)
+    tqc.learn(400)
+    recurrent.learn(512)
     print("trained")
 
     tqc.save("tqc.zip")

@@ -22,7 +22,7 @@ def main() -> None:
         assert np.isfinite(rewards).all()
     print("stepped")
 
-    model.learn(5000)
+    model.learn(1000)
     print("trained")
 
     model.save("sac.zip")

@@ -2,6 +2,7 @@
 
 import gymnasium
 import torch
+from gymnasium.vector import AutoresetMode
 from skrl.agents.torch.ppo import PPO, PPO_CFG
 from skrl.envs.wrappers.torch import Wrapper, wrap_env
 from skrl.memories.torch import RandomMemory
@@ -30,7 +31,8 @@ def ppo(env: Wrapper) -> PPO:
 def main() -> None:
     """Make, step, train, save and load."""
     set_seed(0)
-    env = wrap_env(AgentVectorInterface(gymnasium.make_vec("AFrameHeave-v0", num_envs=16), stagger=True))
+    rows = gymnasium.make_vec("AFrameHeave-v0", num_envs=16, autoreset_mode=AutoresetMode.SAME_STEP)
+    env = wrap_env(AgentVectorInterface(rows, stagger=True))
     single = wrap_env(gymnasium.make("AFrameHeave-v0"))
     print("made")
 
@@ -43,7 +45,7 @@ def main() -> None:
     print("stepped")
 
     agent = ppo(env)
-    SequentialTrainer(env=env, agents=agent, cfg={"timesteps": 1024, "headless": True}).train()
+    SequentialTrainer(env=env, agents=agent, cfg={"timesteps": 256, "headless": True}).train()
     print("trained")
 
     agent.save("agent.pt")

@@ -26,7 +26,9 @@ def algorithm(env: gymnasium.Env) -> Algorithm:
     """PPO for its spaces."""
     shape = env.observation_space.shape
     actor = ContinuousActorProbabilistic(
-        preprocess_net=Net(state_shape=shape, hidden_sizes=(64, 64)), action_shape=env.action_space.shape
+        preprocess_net=Net(state_shape=shape, hidden_sizes=(64, 64)),
+        action_shape=env.action_space.shape,
+        unbounded=True,
     )
     policy = ProbabilisticActorPolicy(
         actor=actor,
@@ -64,7 +66,7 @@ def main() -> None:
             training_collector=Collector(ppo, workers, VectorReplayBuffer(2048, 2)),
             test_collector=None,
             max_epochs=2,
-            epoch_num_steps=2048,
+            epoch_num_steps=1024,
             collection_step_num_env_steps=512,
             update_step_num_repetitions=4,
             show_progress=False,

@@ -13,7 +13,7 @@ from torchrl.objectives.value import GAE
 
 from agents import AgentInterface
 
-STEPS, ROWS = 512, 2
+STEPS, ROWS = 256, 2
 
 
 def make() -> GymWrapper:
@@ -54,7 +54,7 @@ def main() -> None:
     advantage = GAE(gamma=0.94, lmbda=0.97, value_network=critic)
     loss = ClipPPOLoss(policy, critic)
     optimizer = torch.optim.Adam(loss.parameters(), 3e-4)
-    collector = Collector(rows, policy, frames_per_batch=STEPS, total_frames=8 * STEPS)
+    collector = Collector(rows, policy, frames_per_batch=STEPS, total_frames=4 * STEPS)
     for collected in collector:
         for _ in range(4):
             advantage(collected)

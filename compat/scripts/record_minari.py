@@ -28,8 +28,8 @@ def main() -> None:
     data = minari.load_dataset("aframe-heave/agent-v0")
     assert data.total_steps == 1200
     again = data.recover_environment()
-    for episode in data.iterate_episodes():
-        observation, info = again.reset(seed=int(data.storage.get_episode_metadata([episode.id])[0]["seed"]))
+    for seed, episode in enumerate(data.iterate_episodes()):
+        observation, info = again.reset(seed=seed)
         np.testing.assert_array_equal(observation, episode.observations[0])
         for step, action in enumerate(episode.actions):
             observation, reward, _, _, info = again.step(action)

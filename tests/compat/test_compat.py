@@ -4,11 +4,23 @@ from __future__ import annotations
 
 import re
 import sys
+from datetime import date
 from pathlib import Path
 
 import pytest
 
-from compat.__main__ import BEGIN, END, HEADINGS, PAGE, Environment, Options, attempt, open_environment, report
+from compat.__main__ import (
+    BEGIN,
+    END,
+    HEADINGS,
+    PAGE,
+    Environment,
+    Options,
+    Outcome,
+    attempt,
+    open_environment,
+    updated,
+)
 from compat.catalogue import LIBRARIES, ROOT, STAGES, Library
 
 HERE = Environment(Path(sys.executable), "3.0", {"gymnasium": "1.0", "some-library": "2.0", "aframe-heave": "0.0"})
@@ -24,7 +36,7 @@ def tried(tmp_path: Path, code: str, stages: tuple[str, ...] = STAGES, longest: 
 
 def test_a_library_that_comes_through(tmp_path: Path) -> None:
     row = tried(tmp_path, "print('made\\nhello\\nstepped\\nsaved')", stages=("made", "stepped", "saved"))
-    assert row[:-2] == ("some", "2.0", "3.0", "1.0", "yes", "yes", "", "yes")
+    assert row[:-3] == ("some", "2.0", "3.0", "1.0", "yes", "yes", "", "yes")
     assert row[-1] == "mind the gap"
     assert (tmp_path / "log").read_text() == "made\nhello\nstepped\nsaved\n"
 
@@ -39,7 +51,7 @@ def test_a_library_that_comes_through(tmp_path: Path) -> None:
     ids=["raises", "ends early", "hangs"],
 )
 def test_a_library_that_does_not(tmp_path: Path, code: str, failure: str) -> None:
-    *_, made, stepped, trained, saved, _, told = tried(tmp_path, code, longest=5.0)
+    *_, made, stepped, trained, saved, _, _, told = tried(tmp_path, code, longest=5.0)
     assert (made, stepped, trained, saved) == ("yes", "**no**", "**no**", "**no**")
     assert told == f"**{failure}**; mind the gap"
 
@@ -68,8 +80,6 @@ def test_words_choose_libraries() -> None:
     assert [each.name for each in Options(only=("sb3", "RLLIB")).libraries] == ["sb3-contrib", "RLlib"]
     with pytest.raises(ValueError, match="only = 'brax': no library has it in its name"):
         Options(only=("brax",))
-    with pytest.raises(ValueError, match="write: needs a run of every library"):
-        Options(only=("skrl",), write=True)
 
 
 def test_every_library_is_pinned_and_its_files_are_there() -> None:
@@ -99,8 +109,14 @@ def test_the_page_has_a_row_for_each_library_in_the_version_that_is_pinned() -> 
         assert row[-1] == library.remark
 
 
-def test_a_report_names_the_day_and_the_version(tmp_path: Path) -> None:
-    (tmp_path / "script.py").write_text("print('made')")
-    library = Library(name="some", distribution="some-library", script=tmp_path / "script.py", stages=("made",))
-    text = report([attempt(library, HERE, tmp_path / "log")])
-    assert re.match(r"Run of \d{4}-\d\d-\d\d, aframe-heave 0\.0:\n\n\| library \|", text)
+def test_a_library_s_row_takes_the_place_of_its_old_one(tmp_path: Path) -> None:
+    library = next(each for each in LIBRARIES if each.name == "skrl")
+    environment = Environment(HERE.interpreter, "3.11", {"gymnasium": "1.4", "skrl": "9.9"})
+    outcome = Outcome(library, environment, STAGES, 12.3, date(2030, 1, 2))
+    page = PAGE.read_text(encoding="utf-8")
+    found = updated(page, [outcome])
+    assert [line for line in found.splitlines() if line not in page.splitlines()] == [
+        f"| skrl | 9.9 | 3.11 | 1.4 | yes | yes | yes | yes | 12 | 2030-01-02 | {library.remark} |"
+    ]
+    assert len(found.splitlines()) == len(page.splitlines())
+    assert updated(found, []) == found
