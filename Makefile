@@ -5,7 +5,7 @@ BIN := .venv/bin
 
 .DEFAULT_GOAL := help
 
-.PHONY: help train demo docs drives test verify results bench check clean
+.PHONY: help train demo docs drives test verify results bench compat check clean
 
 help:
 	@echo "make train     learn to hold the load still and compare the agent (some five minutes)"
@@ -13,7 +13,7 @@ help:
 	@echo "make docs      build the documentation site, build/site/index.html"
 	@echo "make test      run the whole suite (some ten minutes)"
 	@echo "make check     lint, format, layers, types"
-	@echo "make drives | verify | results | bench | clean"
+	@echo "make drives | verify | results | bench | compat | clean"
 
 train: .venv/installed
 	$(BIN)/python -m train.ppo $(ARGS)
@@ -64,6 +64,10 @@ bench: .venv/installed-test .venv-peers/installed
 	$(BIN)/python -m benchmarks.rfem
 	$(BIN)/python -m benchmarks.rfem_peer --peer-python .venv-peers/bin/python
 
+# Other people's libraries on the wheel: some ten minutes, and 5 GB for the environments.
+compat: .venv/installed-test .venv-compat/learners/installed .venv-compat/rllib/installed
+	$(BIN)/python -m compat $(ARGS)
+
 .venv/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "Python 3.11 or later is needed; $(PYTHON) is $$($(PYTHON) --version). Set PYTHON=..."; exit 1; }
@@ -90,5 +94,10 @@ bench: .venv/installed-test .venv-peers/installed
 	.venv-peers/bin/python benchmarks/peers/install.py benchmarks/peers.txt
 	touch $@
 
+.venv-compat/%/installed: compat/%.txt
+	$(PYTHON) -m venv .venv-compat/$*
+	.venv-compat/$*/bin/python -m pip install --disable-pip-version-check -q --no-cache-dir -r $<
+	touch $@
+
 clean:
-	rm -rf .venv .venv-peers build *.egg-info
+	rm -rf .venv .venv-compat .venv-peers build *.egg-info

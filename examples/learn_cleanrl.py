@@ -1,5 +1,6 @@
 """PPO in one file, as CleanRL writes it, on the vector wrapper: train, then run what it learned on held-out seas."""
 
+from pathlib import Path
 from typing import Literal
 
 import gymnasium
@@ -35,9 +36,13 @@ class Network(nn.Module):
 
 
 def learn(
-    timesteps: int = 1_000_000, observation: Literal["state", "sensors"] = "state", seed: int = 0, scenarios: int = 50
+    timesteps: int = 1_000_000,
+    observation: Literal["state", "sensors"] = "state",
+    seed: int = 0,
+    scenarios: int = 50,
+    save: Path | None = None,
 ) -> float:
-    """Return the median heave reduction over so many held-out scenarios."""
+    """Return the median heave reduction over so many held-out scenarios; ``save``: file for the actor's weights."""
     torch.set_num_threads(1)  # more only slow so small a network down
     torch.manual_seed(seed)
     config = aframe_env.TaskConfig(observation=observation)
@@ -92,6 +97,8 @@ def learn(
                 nn.utils.clip_grad_norm_(parameters, GRADIENT_LIMIT)
                 optimizer.step()
 
+    if save is not None:
+        torch.save(actor.state_dict(), save)
     policy = FeaturePolicy(
         lambda features: actor(torch.from_numpy(features)).detach().numpy(), FeatureConfig.of(config)
     )

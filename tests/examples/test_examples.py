@@ -12,7 +12,8 @@ from agents.learned.features import SENSED_FEATURES
 from examples import learn_cleanrl, learn_sb3
 from train.learn import ppo, sac
 
-PAGE = (Path(__file__).parents[2] / "docs/learners.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs/learners.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("example", [learn_sb3, learn_cleanrl], ids=["sb3", "cleanrl"])
@@ -31,16 +32,16 @@ def test_the_page_names_every_feature():
 
 
 @pytest.mark.parametrize(
-    ("index", "options", "names"),
+    ("algorithm", "options", "names"),
     [
-        (0, ppo.Options(), ("n_steps", "n_epochs", "gae_lambda", "clip_range", "reward_scale", "reward_knee")),
-        (1, sac.Options(), ("gradient_steps", "tau", "target_entropy", "learning_starts", "reward_scale")),
+        ("ppo", ppo.Options(), ("n_steps", "n_epochs", "gae_lambda", "clip_range", "reward_scale", "reward_knee")),
+        ("sac", sac.Options(), ("gradient_steps", "tau", "target_entropy", "learning_starts", "reward_scale")),
     ],
     ids=["ppo", "sac"],
 )
-def test_the_page_s_hyperparameters_are_the_options_defaults(index, options, names):
-    block = re.findall(r"```yaml\n(.*?)```", PAGE, flags=re.DOTALL)[index]
-    said = dict(re.findall(r"^ +(?:- )?(\w+): (\S+)$", block, flags=re.MULTILINE))
+def test_the_settings_for_rl_zoo3_are_the_options_defaults(algorithm, options, names):
+    text = (ROOT / "examples/rl_zoo3" / f"{algorithm}.yml").read_text(encoding="utf-8")
+    said = dict(re.findall(r"^ +(?:- )?(\w+): (\S+)$", text, flags=re.MULTILINE))
     assert said["learning_rate"] == f"lin_{options.learning_rate}"
     assert said["n_timesteps"] == str(options.timesteps)
     for name in ("n_envs", "batch_size", "gamma", "drift_limit", "horizon", *names):
