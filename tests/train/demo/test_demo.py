@@ -110,7 +110,60 @@ def test_a_recording_that_cannot_be_is_refused(tmp_path):
     assert there.read_text() == "mine"
 
 
-# ---- in the browser
+# ---- in the browser: what is recorded first, while no live page keeps the processor busy
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """Five seconds of a held-out scenario, as a page and as the recording alone."""
+    pytest.importorskip("viser", reason="needs viser")
+    folder = tmp_path_factory.mktemp("replay")
+    files = [folder / "replay.html", folder / "replay.viser"]
+    for file in files:
+        options = Options(policy=LAW, scenario=3, start=20.0, seconds=5.0, record=file)
+        assert demo.run(options, Console(quiet=True)) == 0
+    assert sorted(folder.iterdir()) == files
+    return files
+
+
+def test_a_recording_is_of_the_episode_of_the_comparison(recorded):
+    """viser's format: sizes, then messages in msgpack, compressed; a caption says what is shown."""
+    msgspec, zstandard = pytest.importorskip("msgspec"), pytest.importorskip("zstandard")
+    inner = zstandard.ZstdDecompressor().decompressobj().decompress(recorded[1].read_bytes()[8:])
+    told = msgspec.msgpack.decode(inner[8 : 8 + int.from_bytes(inner[:8], "little")])
+    assert told["durationSeconds"] == pytest.approx(5.0)
+    captions = re.findall(
+        r"feed-forward \+ feedback \(state\), ([0-9.]+) s\ndepth error (-?[0-9.]+) (c?m), drum still (-?[0-9.]+) (c?m)",
+        "\n".join(
+            str(message["updates"]["text"]) for _, message in told["messages"] if "text" in message.get("updates", ())
+        ),
+    )
+    assert len(captions) == 15
+    scenarios = held_out_scenarios(ScenarioDistribution(), 4)
+    law, still = (run(build(name, sensors=False)[0], scenarios, episode_duration=25.0) for name in (LAW, "drum still"))
+    for time, error, unit, left, its_unit in captions[::3]:
+        step = round(10.0 * float(time))
+        assert float(error) * (0.01 if unit == "cm" else 1.0) == pytest.approx(law.error[3, step], abs=0.006)
+        assert float(left) * (0.01 if its_unit == "cm" else 1.0) == pytest.approx(still.error[3, step], abs=0.006)
+
+
+def test_a_recording_plays_without_a_network(recorded, chromium_in_3d):
+    context = chromium_in_3d.new_context(offline=True, viewport={"width": 240, "height": 180})
+    opened = context.new_page()
+    wrong, asked = [], []
+    opened.on("pageerror", lambda error: wrong.append(str(error)))
+    opened.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
+    opened.on("request", lambda request: asked.append(request.url))
+    opened.set_default_timeout(120_000)
+    opened.goto(recorded[0].as_uri())
+    clock = opened.locator("input").first
+    clock.wait_for()
+    before = clock.input_value(), opened.screenshot()
+    opened.wait_for_function("(before) => document.querySelector('input').value !== before", arg=before[0])
+    assert opened.screenshot() != before[1]
+    assert wrong == []
+    assert [url for url in asked if not url.startswith(("file:", "blob:", "data:"))] == []
+    context.close()
 
 
 @pytest.fixture(scope="module")
@@ -170,56 +223,3 @@ def test_a_slider_changes_the_loads_error(page):
 def test_nothing_went_wrong_and_nothing_was_asked_elsewhere(page, viewer):
     assert page.wrong == []
     assert {url.split("/")[2] for url in page.asked if url.startswith(("http", "ws"))} == {viewer.address.split("/")[2]}
-
-
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
-    """Five seconds of a held-out scenario, as a page and as the recording alone."""
-    pytest.importorskip("viser", reason="needs viser")
-    folder = tmp_path_factory.mktemp("replay")
-    files = [folder / "replay.html", folder / "replay.viser"]
-    for file in files:
-        options = Options(policy=LAW, scenario=3, start=20.0, seconds=5.0, record=file)
-        assert demo.run(options, Console(quiet=True)) == 0
-    assert sorted(folder.iterdir()) == files
-    return files
-
-
-def test_a_recording_is_of_the_episode_of_the_comparison(recorded):
-    """viser's format: sizes, then messages in msgpack, compressed; a caption says what is shown."""
-    msgspec, zstandard = pytest.importorskip("msgspec"), pytest.importorskip("zstandard")
-    inner = zstandard.ZstdDecompressor().decompressobj().decompress(recorded[1].read_bytes()[8:])
-    told = msgspec.msgpack.decode(inner[8 : 8 + int.from_bytes(inner[:8], "little")])
-    assert told["durationSeconds"] == pytest.approx(5.0)
-    captions = re.findall(
-        r"feed-forward \+ feedback \(state\), ([0-9.]+) s\ndepth error (-?[0-9.]+) (c?m), drum still (-?[0-9.]+) (c?m)",
-        "\n".join(
-            str(message["updates"]["text"]) for _, message in told["messages"] if "text" in message.get("updates", ())
-        ),
-    )
-    assert len(captions) == 75
-    scenarios = held_out_scenarios(ScenarioDistribution(), 4)
-    law, still = (run(build(name, sensors=False)[0], scenarios, episode_duration=25.0) for name in (LAW, "drum still"))
-    for time, error, unit, left, its_unit in captions[::15]:
-        step = round(10.0 * float(time))
-        assert float(error) * (0.01 if unit == "cm" else 1.0) == pytest.approx(law.error[3, step], abs=0.006)
-        assert float(left) * (0.01 if its_unit == "cm" else 1.0) == pytest.approx(still.error[3, step], abs=0.006)
-
-
-def test_a_recording_plays_without_a_network(recorded, chromium_in_3d):
-    context = chromium_in_3d.new_context(offline=True, viewport={"width": 240, "height": 180})
-    opened = context.new_page()
-    wrong, asked = [], []
-    opened.on("pageerror", lambda error: wrong.append(str(error)))
-    opened.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
-    opened.on("request", lambda request: asked.append(request.url))
-    opened.set_default_timeout(120_000)
-    opened.goto(recorded[0].as_uri())
-    clock = opened.locator("input").first
-    clock.wait_for()
-    before = clock.input_value(), opened.screenshot()
-    opened.wait_for_function("(before) => document.querySelector('input').value !== before", arg=before[0])
-    assert opened.screenshot() != before[1]
-    assert wrong == []
-    assert [url for url in asked if not url.startswith(("file:", "blob:", "data:"))] == []
-    context.close()
