@@ -48,7 +48,6 @@ SMALL = {
 ELSEWHERE = {
     ("scenario-files.md", "toml"): "tests/scenario/test_scenario_docs.py",
     ("scenario-files.md", "csv"): "tests/scenario/test_scenario_docs.py",
-    ("learners.md", "yaml"): "tests/examples/test_examples.py",
     ("architecture.md", "text"): "the layers, which lint-imports holds",
 }
 """Blocks of other languages than Python and the shell, and what tests them."""
@@ -179,6 +178,8 @@ def test_commands_are_taken(page: Path, desk: Path, parsed: Callable[[str], Any]
                 assert all(Requirement(word).extras <= set(extras) for word in words[1:])
             elif program == "xdg-open":
                 assert Path(words[0]).parent in made
+            elif words[1].startswith("rl_zoo3."):
+                assert (ROOT / words[words.index("-c") + 1]).is_file()  # `make compat` has the library, and runs it
             else:
                 made.add(getattr(parsed(line), "out", None))
 
