@@ -64,7 +64,7 @@ bench: .venv/installed-test .venv-peers/installed
 	$(BIN)/python -m benchmarks.rfem
 	$(BIN)/python -m benchmarks.rfem_peer --peer-python .venv-peers/bin/python
 
-# Other people's libraries on the wheel: up to half an hour on two busy cores, and 5 GB for the environments.
+# Other people's libraries on the wheel: up to half an hour on two busy cores, and 4 to 12 GB for the environments.
 compat: .venv/installed-test .venv-compat/learners/installed .venv-compat/rllib/installed
 	$(BIN)/python -m compat $(ARGS)
 
