@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -167,15 +168,15 @@ def test_a_set_that_exists_is_refused_and_replaced_when_asked(root: Path) -> Non
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs Ctrl-C as a signal")
-def test_an_interrupted_set_leaves_nothing(root: Path) -> None:
-    with subprocess.Popen(command("--episodes", "50000"), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as started:
-        until = time.monotonic() + 120.0
-        while not list(root.rglob("main_data.hdf5")) and time.monotonic() < until:
-            time.sleep(0.1)
-        time.sleep(0.5)
-        started.send_signal(signal.SIGINT)
-        _, said = started.communicate(timeout=60.0)
-    assert (started.returncode, said) == (130, b"interrupted\n")
+def test_an_interrupted_set_leaves_nothing(root: Path, start: Callable[..., subprocess.Popen[str]]) -> None:
+    started = start(command("--episodes", "50000"), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    until = time.monotonic() + 120.0
+    while not list(root.rglob("main_data.hdf5")) and time.monotonic() < until:
+        time.sleep(0.1)
+    time.sleep(0.5)
+    started.send_signal(signal.SIGINT)
+    _, said = started.communicate(timeout=60.0)
+    assert (started.returncode, said) == (130, "interrupted\n")
     assert list(root.iterdir()) == []
     assert minari.list_local_datasets() == {}
 
