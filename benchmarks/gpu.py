@@ -139,8 +139,8 @@ def measure(rows: int, options: Options, device: torch.device, bandwidth: float)
 def learn(target: float, options: Options, chosen: ppo_rsl.Options) -> Learned:
     """Learn until the target; the clock stands still while it is looked at."""
     built = ppo_rsl.build(chosen)
-    limits = learner.Options(target=target, scenarios=options.scenarios, limit=options.limit)
-    clock = learner.Clock(lambda: to_policy(built, chosen)[0], limits)
+    course = learner.Course("state", options.scenarios)
+    clock = learner.Clock(lambda: to_policy(built, chosen)[0], course, target, options.limit)
     built.model.learn(chosen.timesteps, callback=clock)
     return Learned(target, clock.reached, clock.seconds, built.model.num_timesteps, clock.reductions)
 

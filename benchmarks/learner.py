@@ -113,29 +113,33 @@ class Stopwatch:
 
 
 class Course:
-    """Validation scenarios, and the medians of what a learner begins with and what it shall reach."""
+    """Validation scenarios to look at agents on."""
 
-    def __init__(self, options: Options) -> None:
-        chosen = ppo.Options(observation=options.observation)
-        self._observation = options.observation
-        self._scenarios = validation_scenarios(chosen.config.source, options.scenarios)
+    def __init__(self, observation: Literal["state", "sensors"], scenarios: int) -> None:
+        self._options = ppo.Options(observation=observation)
+        self._scenarios = validation_scenarios(self._options.config.source, scenarios)
         self._still = run(DrumStill(), self._scenarios).rms
-        self.output_zero = self.median(output_zero(chosen.features))
-        self.shipped = self.median(agents.load("ppo-sensors" if options.observation == "sensors" else "ppo"))
-        self.target = self.output_zero + options.half_way * (self.shipped - self.output_zero)
+
+    def output_zero(self) -> float:
+        """Median of the hand-written base alone."""
+        return self.median(output_zero(self._options.features))
+
+    def shipped(self) -> float:
+        """Median of the shipped agent."""
+        return self.median(agents.load("ppo-sensors" if self._options.observation == "sensors" else "ppo"))
 
     def median(self, policy: Policy) -> float:
         """Median heave reduction of a policy."""
-        left = run(policy, self._scenarios, observation=self._observation).rms
+        left = run(policy, self._scenarios, observation=self._options.observation).rms
         return 1.0 - float(np.median(left / self._still))
 
 
 class Clock(BaseCallback):
     """Callback that stops the learner at the target or the limit."""
 
-    def __init__(self, policy: Callable[[], Policy], course: Course, limit: float) -> None:
+    def __init__(self, policy: Callable[[], Policy], course: Course, target: float, limit: float) -> None:
         super().__init__()
-        self._policy, self._course, self._limit = policy, course, limit
+        self._policy, self._course, self._target, self._limit = policy, course, target, limit
         self._looked = -LOOKS_EVERY
         self.reductions: list[float] = []
         self.seconds = 0.0
@@ -144,7 +148,7 @@ class Clock(BaseCallback):
     @property
     def reached(self) -> bool:
         """True if the target was reached."""
-        return bool(self.reductions) and self.reductions[-1] >= self._course.target
+        return bool(self.reductions) and self.reductions[-1] >= self._target
 
     def _on_training_start(self) -> None:
         self._since = time.perf_counter()
@@ -198,11 +202,11 @@ SETUPS: Final[dict[Setup, Callable[[ppo.Options], tuple[BaseAlgorithm, Callable[
 }
 
 
-def learn(setup: Setup, chosen: ppo.Options, course: Course, limit: float) -> Outcome:
+def learn(setup: Setup, chosen: ppo.Options, course: Course, target: float, limit: float) -> Outcome:
     """Learn until the target or the limit."""
     model, policy = SETUPS[setup](chosen)
     environment, updates = Stopwatch(model.env, "step"), Stopwatch(model, "train")
-    clock = Clock(policy, course, limit)
+    clock = Clock(policy, course, target, limit)
     model.learn(chosen.timesteps, callback=clock)
     spent = max(clock.seconds, 1e-9)
     return Outcome(
@@ -217,7 +221,7 @@ def learn(setup: Setup, chosen: ppo.Options, course: Course, limit: float) -> Ou
     )
 
 
-def tune(setup: Setup, options: Options, course: Course, console: Console) -> dict[str, Any]:
+def tune(setup: Setup, options: Options, course: Course, target: float, console: Console) -> dict[str, Any]:
     """Search for the settings that reach the target soonest."""
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     defaults = ppo.Options(observation=options.observation)
@@ -226,7 +230,7 @@ def tune(setup: Setup, options: Options, course: Course, console: Console) -> di
 
     def seconds(trial: optuna.Trial) -> float:
         chosen = replace(defaults, **suggest(trial, SPACE), seed=FIRST_SEED + trial.number)
-        outcome = learn(setup, chosen, course, options.limit)
+        outcome = learn(setup, chosen, course, target, options.limit)
         console.print(f"{setup}, trial {trial.number}: {said(outcome)}")
         # Those that were given up are ranked by how far they got.
         return outcome.seconds + (0.0 if outcome.reached else options.limit * (1.0 - max(outcome.reductions)))
@@ -249,16 +253,16 @@ def main() -> int:
     with user_errors():
         options, console = parse(Options, "benchmarks.learner", __doc__ or ""), Console()
         torch.set_num_threads(1)
-        course = Course(options)
-        console.print(
-            f"output zero {course.output_zero:.2%}, shipped agent {course.shipped:.2%}, target {course.target:.2%}"
-        )
-        settings = {setup: tune(setup, options, course, console) for setup in SETUPS}
+        course = Course(options.observation, options.scenarios)
+        zero, shipped = course.output_zero(), course.shipped()
+        target = zero + options.half_way * (shipped - zero)
+        console.print(f"output zero {zero:.2%}, shipped agent {shipped:.2%}, target {target:.2%}")
+        settings = {setup: tune(setup, options, course, target, console) for setup in SETUPS}
         defaults = ppo.Options(observation=options.observation)
         outcomes = []
         for seed in range(options.rounds):
             for setup in SETUPS:
-                outcome = learn(setup, replace(defaults, **settings[setup], seed=seed), course, options.limit)
+                outcome = learn(setup, replace(defaults, **settings[setup], seed=seed), course, target, options.limit)
                 outcomes.append(outcome)
                 console.print(f"{setup}, seed {seed}: {said(outcome)}")
         mine, theirs = ([o.seconds for o in outcomes if o.setup == setup] for setup in SETUPS)
@@ -267,9 +271,9 @@ def main() -> int:
             options.out,
             {
                 "observation": options.observation,
-                "output_zero": course.output_zero,
-                "shipped": course.shipped,
-                "target": course.target,
+                "output_zero": zero,
+                "shipped": shipped,
+                "target": target,
                 "limit_s": options.limit,
                 "trials": options.trials,
                 "settings": settings,

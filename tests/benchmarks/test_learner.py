@@ -21,9 +21,8 @@ def test_a_target_below_output_zero_is_met_before_anything_is_learned(tmp_path, 
 
 @pytest.mark.parametrize("setup", learner.SETUPS)
 def test_a_learner_is_looked_at_from_the_start_and_given_up_at_the_limit(setup):
-    options = learner.Options(half_way=1e9, scenarios=2)
     few = replace(ppo.Options(observation="sensors"), n_envs=2, n_steps=8, batch_size=16, n_epochs=1)
-    outcome = learner.learn(setup, few, learner.Course(options), limit=1e-3)
+    outcome = learner.learn(setup, few, learner.Course("sensors", 2), target=1.1, limit=1e-3)
     assert not outcome.reached
     assert outcome.seconds > 1e-3
     assert outcome.timesteps == 18
