@@ -104,19 +104,18 @@ class Checkpoints:
 
     def write(self, learner: Learner) -> Path:
         """Write a checkpoint; the one before the last goes."""
-        memory = Memory()
         model, rows = _kept_of(learner)
-        memory.put("rows", rows.memory())
-        memory.put("learner", of_learner(model))
-        place = self.folder / f"{learner.model.num_timesteps:012d}"
+        place = self.folder / f"{model.num_timesteps:012d}"
         if place.is_dir():  # taken up again, and asked to stop before anything was learned
             return place
-        replay = getattr(learner.model, "replay_buffer", None)
-        steps = learner.model.num_timesteps // learner.rows.num_envs
+        memory = Memory()
+        memory.put("rows", rows.memory())
+        memory.put("learner", of_learner(model))
+        replay = getattr(model, "replay_buffer", None)
+        steps = model.num_timesteps // rows.num_envs
         segments = None if replay is None else self._write_replay(replay, steps)
         arrays = save_arrays({name: _storable(array) for name, array in memory.arrays.items()})
         card = {
-            "timesteps": learner.model.num_timesteps,
             "arrays": sha256(arrays).hexdigest(),
             "complex": [name for name, array in memory.arrays.items() if np.iscomplexobj(array)],
             "replay": segments,
@@ -140,15 +139,15 @@ class Checkpoints:
 
     def take_up(self, learner: Learner) -> dict[str, Any] | None:
         """Put the newest whole checkpoint into a learner that was built alike, and return its card; None for none."""
+        model, rows = _kept_of(learner)
+        replay = getattr(model, "replay_buffer", None)
         for place in reversed(self._places()):
             found = _read(place)
             if found is None:
                 continue
             card, arrays = found
-            replay = getattr(learner.model, "replay_buffer", None)
             if replay is not None and not self._read_replay(replay, card["replay"]):
                 continue
-            model, rows = _kept_of(learner)
             memory = Memory(arrays, card["values"])
             rows.recall(memory.under("rows"))
             into_learner(model, memory.under("learner"))
@@ -225,7 +224,6 @@ class KeepCheckpoints(BaseCallback):
         self._last = time.monotonic()
         self.seconds = 0.0
         """Spent on checkpoints."""
-        self.written = False
 
     def _on_step(self) -> bool:
         return True
@@ -237,7 +235,7 @@ class KeepCheckpoints(BaseCallback):
         if can_be_kept(self._learner):
             begin = time.monotonic()
             self._checkpoints.write(self._learner)
-            self._last, self.written = time.monotonic(), True
+            self._last = time.monotonic()
             self.seconds += self._last - begin
         if asked is not None:
             raise Stopped(asked)

@@ -109,22 +109,25 @@ def main(name: str) -> int:
     """Run the command of a learner."""
     with user_errors():
         spec = find_learner(name)
-        options = parse(spec.options, spec.command, spec.description)
+        options = _options(spec)
         successor = spec.successor(options)
         if successor is not None:
             spec = find_learner(successor)
-            options = parse(spec.options, spec.command, spec.description)
-        if options.resume is not None:
-            options = _options_of(options.resume, spec)
+            options = _options(spec)
         return train(spec, options, Console())
 
 
-def _options_of(folder: Path, spec: LearnerSpec) -> LearningOptions:
-    """Options of the training whose folder that is."""
+def _options(spec: LearnerSpec) -> LearningOptions:
+    """Options of the command line, or those of the training that it goes on with."""
+    options = parse(spec.options, spec.command, spec.description)
+    folder = options.resume
+    if folder is None:
+        return options
     config = folder / CONFIG
     if not config.is_file():
         raise InvalidValue(f"resume = {str(folder)!r}: no folder of a training, which has {CONFIG}")
-    return replace(read_options(config, spec.options), out=folder)
+    # What was begun with --overwrite must not be overwritten now.
+    return replace(read_options(config, spec.options), out=folder, overwrite=False)
 
 
 def train(spec: LearnerSpec, options: LearningOptions, console: Console) -> int:
@@ -229,7 +232,7 @@ def _learn(spec: LearnerSpec, options: LearningOptions, opened: Run, console: Co
     )
     console.print(f"agent: {folder / WEIGHTS} after {model.num_timesteps:,} steps in {seconds:.0f} s")
     if stopped is not None:
-        what = f"--resume {folder} goes on" if keep.written else "what was learned is kept, and cannot go on"
+        what = f"--resume {folder} goes on" if can_be_kept(learner) else "what was learned is kept, and cannot go on"
         console.print(f"stopped by {stopped}: {what}")
         return stopped.status
     checkpoints.remove()

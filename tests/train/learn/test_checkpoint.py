@@ -21,7 +21,7 @@ from agents.learned.agent import load
 from train.learn import checkpoint, ppo, ppo_predictive, sac
 from train.learn.checkpoint import ARRAYS, CARD, FOLDER, SEGMENTS, Checkpoints
 from train.learn.learner import LearnerSpec
-from train.learn.run import train
+from train.learn.run import main, train
 
 Start = Callable[..., subprocess.Popen[str]]
 PPO = {"n_envs": 3, "n_steps": 8, "batch_size": 12, "n_epochs": 2, "horizon": 2.0}
@@ -73,9 +73,11 @@ def test_a_stopped_training_goes_on_to_the_same_agent(
         train(spec, options, QUIET)
 
 
-def stopped_after(count: int, case: str, out: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[LearnerSpec, Any]:
+def stopped_after(
+    count: int, case: str, out: Path, monkeypatch: pytest.MonkeyPatch, **more: Any
+) -> tuple[LearnerSpec, Any]:
     """A training that was stopped after so many checkpoints."""
-    spec, options = options_of(case, out, checkpoint_every=0.0)
+    spec, options = options_of(case, out, checkpoint_every=0.0, **more)
     write, written = Checkpoints.write, []
 
     def stops(self: Checkpoints, learner: Any) -> Path:
@@ -137,6 +139,15 @@ def test_a_replay_is_written_once_and_what_is_overwritten_in_it_goes(
     assert spans[0][0] <= 59 - size < spans[0][1]
     # Those of the newest checkpoint and of the one before it.
     assert len(list((tmp_path / FOLDER / SEGMENTS).iterdir())) <= size + 1
+
+
+def test_what_was_begun_with_overwrite_is_not_overwritten_by_resume(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stopped_after(3, "ppo", tmp_path, monkeypatch, overwrite=True)
+    monkeypatch.setattr(sys, "argv", ["train.ppo", "--resume", str(tmp_path)])
+    assert main("ppo") == 0
+    assert "goes on from 48 control steps" in capsys.readouterr().out
 
 
 def test_other_options_are_not_taken_for_the_same_training(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
