@@ -6,6 +6,7 @@ import os
 import shutil
 import signal
 import subprocess
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -61,3 +62,18 @@ def start() -> Iterator[Callable[..., subprocess.Popen[str]]]:
         with suppress(ProcessLookupError):
             os.killpg(each.pid, signal.SIGKILL)
         each.communicate()
+
+
+@pytest.fixture
+def interrupt() -> Callable[[subprocess.Popen[str], Callable[[], object]], str]:
+    """Press Ctrl-C half a second after a process has begun its work; return what it says on standard error."""
+
+    def press(process: subprocess.Popen[str], begun: Callable[[], object]) -> str:
+        until = time.monotonic() + 120.0
+        while not begun() and time.monotonic() < until:
+            time.sleep(0.1)
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        return process.communicate(timeout=60.0)[1]
+
+    return press

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -168,14 +166,11 @@ def test_a_set_that_exists_is_refused_and_replaced_when_asked(root: Path) -> Non
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs Ctrl-C as a signal")
-def test_an_interrupted_set_leaves_nothing(root: Path, start: Callable[..., subprocess.Popen[str]]) -> None:
+def test_an_interrupted_set_leaves_nothing(
+    root: Path, start: Callable[..., subprocess.Popen[str]], interrupt: Callable[..., str]
+) -> None:
     started = start(command("--episodes", "50000"), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-    until = time.monotonic() + 120.0
-    while not list(root.rglob("main_data.hdf5")) and time.monotonic() < until:
-        time.sleep(0.1)
-    time.sleep(0.5)
-    started.send_signal(signal.SIGINT)
-    _, said = started.communicate(timeout=60.0)
+    said = interrupt(started, lambda: list(root.rglob("main_data.hdf5")))
     assert (started.returncode, said) == (130, "interrupted\n")
     assert list(root.iterdir()) == []
     assert minari.list_local_datasets() == {}

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -175,15 +173,12 @@ def test_a_full_disk_leaves_nothing(tmp_path: Path, suffix: str) -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs Ctrl-C as a signal")
-def test_an_interrupted_video_leaves_nothing(tmp_path: Path, start: Callable[..., subprocess.Popen[str]]) -> None:
+def test_an_interrupted_video_leaves_nothing(
+    tmp_path: Path, start: Callable[..., subprocess.Popen[str]], interrupt: Callable[..., str]
+) -> None:
     options = ["--policy", "drum still", "--seconds", "600", "--out", str(tmp_path / "a.gif")]
     command = [sys.executable, "-m", "train.video", *options]
     started = start(command, stderr=subprocess.PIPE)
-    until = time.monotonic() + 120.0
-    while not list(tmp_path.iterdir()) and time.monotonic() < until:
-        time.sleep(0.1)
-    time.sleep(0.5)
-    started.send_signal(signal.SIGINT)
-    _, said = started.communicate(timeout=60.0)
+    said = interrupt(started, lambda: list(tmp_path.iterdir()))
     assert (started.returncode, said) == (130, "interrupted\n")
     assert list(tmp_path.iterdir()) == []

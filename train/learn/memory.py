@@ -56,13 +56,11 @@ class _Leaf:
 
 
 def of_object(root: object) -> Memory:
-    """What an object of this package remembers, and those that it holds: arrays, numbers and generators."""
+    """What an object of this package remembers, and those that it holds: arrays and plain values."""
     memory = Memory()
     for leaf in _leaves(root):
         if isinstance(leaf.value, np.ndarray):
             memory.arrays[leaf.place] = leaf.value.copy()
-        elif isinstance(leaf.value, np.random.Generator):
-            memory.values[leaf.place] = leaf.value.bit_generator.state
         else:
             memory.values[leaf.place] = leaf.value
     return memory
@@ -78,8 +76,6 @@ def into_object(root: object, memory: Memory) -> None:
             else:
                 assert leaf.replace is not None, leaf.place
                 leaf.replace(array.copy())
-        elif isinstance(leaf.value, np.random.Generator):
-            leaf.value.bit_generator.state = memory.values[leaf.place]
         else:
             assert leaf.replace is not None
             leaf.replace(memory.values[leaf.place])
@@ -89,8 +85,8 @@ def _leaves(root: object) -> Iterator[_Leaf]:
     seen: set[int] = set()
 
     def walk(place: str, value: Any, replace: Callable[[Any], object] | None) -> Iterator[_Leaf]:
-        if isinstance(value, np.ndarray | np.random.Generator):
-            if isinstance(value, np.random.Generator) or value.flags.writeable:
+        if isinstance(value, np.ndarray):
+            if value.flags.writeable:
                 yield _Leaf(place, value, replace)
         elif value is None or isinstance(value, Scalar):
             if replace is not None:
@@ -111,8 +107,7 @@ def _leaves(root: object) -> Iterator[_Leaf]:
 def of_learner(model: BaseAlgorithm) -> Memory:
     """What a learner of Stable-Baselines3 remembers between two rollouts, its replay apart."""
     memory = Memory()
-    for name, module in _modules(model).items():
-        memory.put(name, _of_tensors(module.state_dict()))
+    memory.put("policy", _of_tensors(model.policy.state_dict()))
     for name, optimizer in _optimizers(model).items():
         state = optimizer.state_dict()
         for index, tensors in state["state"].items():
@@ -132,8 +127,7 @@ def of_learner(model: BaseAlgorithm) -> Memory:
 
 def into_learner(model: BaseAlgorithm, memory: Memory) -> None:
     """Put back what ``of_learner`` told of a learner that was built alike; its ``learn`` may then go on."""
-    for name, module in _modules(model).items():
-        module.load_state_dict(_to_tensors(memory.under(name)))
+    model.policy.load_state_dict(_to_tensors(memory.under("policy")))
     for name, optimizer in _optimizers(model).items():
         part = memory.under(name)
         state = optimizer.state_dict()
@@ -157,10 +151,6 @@ def into_learner(model: BaseAlgorithm, memory: Memory) -> None:
 
 _COUNTERS: Final = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")
 _LAST: Final = ("_last_obs", "_last_episode_starts")
-
-
-def _modules(model: BaseAlgorithm) -> dict[str, torch.nn.Module]:
-    return {"policy": model.policy}
 
 
 def _optimizers(model: BaseAlgorithm) -> dict[str, torch.optim.Optimizer]:
