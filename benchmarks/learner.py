@@ -163,6 +163,10 @@ class Clock(BaseCallback):
             self.reductions.append(self._course.median(self._policy()))
         self._since = time.perf_counter()
 
+    def _on_training_end(self) -> None:
+        # The step after which the learner hears that it has to stop.
+        self.seconds += time.perf_counter() - self._since
+
 
 def ours(chosen: ppo.Options) -> tuple[BaseAlgorithm, Callable[[], Policy]]:
     """This package's PPO, and how to take a policy out of it."""
