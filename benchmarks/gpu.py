@@ -25,7 +25,7 @@ from aframe_env.torch_env import AFrameHeaveTorchEnv
 from aframe_env.validation import require_integer, require_number
 from benchmarks import learner
 from train.learn import ppo_rsl
-from train.learn.run import to_policy
+from train.learn.trained import to_policy
 from train.shared.cli import parse
 from train.shared.run_folder import user_errors, versions, write_json
 

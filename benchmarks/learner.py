@@ -36,7 +36,7 @@ from agents.policy import DrumStill, Policy
 from agents.rollout import run
 from train.learn import ppo
 from train.learn.learner import Search
-from train.learn.run import to_policy
+from train.learn.trained import to_policy
 from train.learn.tune import suggest, validation_scenarios
 from train.shared.cli import parse
 from train.shared.run_folder import user_errors, versions, write_json

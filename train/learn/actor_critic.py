@@ -73,7 +73,8 @@ def _constant(inputs: int, value: float) -> nn.Linear:
 
 def actor_of(latent: ActorLatent, head: Mapping[str, torch.Tensor], *, squashed: bool) -> Actor:
     """The agent's network, from a learner's actor."""
-    actor = Actor(latent.inputs, latent.perceptron[0].out_features, squashed=squashed)  # type: ignore[arg-type]
+    with torch.random.fork_rng(devices=()):  # a look at the agent must not change how the learner goes on
+        actor = Actor(latent.inputs, latent.perceptron[0].out_features, squashed=squashed)  # type: ignore[arg-type]
     actor.perceptron.load_state_dict(latent.perceptron.state_dict())
     actor.head.load_state_dict(head)
     return actor

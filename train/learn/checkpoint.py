@@ -28,7 +28,7 @@ from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 
 from train.learn.learner import Learner
-from train.learn.memory import Memory, into_learner, of_learner
+from train.learn.memory import Memory, into_best, into_learner, of_best, of_learner
 from train.learn.sb3_env import TrainingVecEnv
 from train.shared.run_folder import versions, write_atomically
 
@@ -111,6 +111,7 @@ class Checkpoints:
         memory = Memory()
         memory.put("rows", rows.memory())
         memory.put("learner", of_learner(model))
+        memory.put("best", of_best(learner.best))
         replay = getattr(model, "replay_buffer", None)
         steps = model.num_timesteps // rows.num_envs
         segments = None if replay is None else self._write_replay(replay, steps)
@@ -151,6 +152,7 @@ class Checkpoints:
             memory = Memory(arrays, card["values"])
             rows.recall(memory.under("rows"))
             into_learner(model, memory.under("learner"))
+            into_best(learner.best, learner.to_actor, memory.under("best"))
             return card
         return None
 

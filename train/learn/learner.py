@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -52,6 +53,17 @@ class Rows(Protocol):
         ...
 
 
+@dataclass
+class Best:
+    """The best agent that was looked at while learning."""
+
+    left: float = math.inf
+    """Mean share of the heave that it leaves in the scenarios that it is looked at on."""
+    timesteps: int = 0
+    """Control steps that it has learned from."""
+    actor: Actor | None = None
+
+
 @dataclass(frozen=True)
 class Learner:
     """A learner, its rows, and how to take the agent out of it."""
@@ -60,6 +72,7 @@ class Learner:
     model: Model
     rows: Rows
     to_actor: Callable[[], Actor]
+    best: Best = field(default_factory=Best)
 
 
 @dataclass(frozen=True)

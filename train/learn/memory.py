@@ -18,6 +18,8 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from agents.control.kalman import Schedule, WaveBank
 from agents.control.predictive import PlanningConfig
 from agents.learned.features import FeatureConfig
+from agents.learned.network import Actor
+from train.learn.learner import Best
 
 FIXED: Final = (Schedule, WaveBank, PlanningConfig, FeatureConfig)
 """Kinds of objects that hold nothing but what was known at the start."""
@@ -147,6 +149,20 @@ def into_learner(model: BaseAlgorithm, memory: Memory) -> None:
     model.ep_info_buffer = deque(memory.values["episodes"], maxlen=model._stats_window_size)
     model.ep_success_buffer = deque(maxlen=model._stats_window_size)
     _into_generators(model, memory.under("generators"))
+
+
+def of_best(best: Best) -> Memory:
+    """The best agent so far."""
+    if best.actor is None:
+        return Memory(values={"left": None, "timesteps": 0})
+    return Memory(_of_tensors(best.actor.state_dict()).arrays, {"left": best.left, "timesteps": best.timesteps})
+
+
+def into_best(best: Best, to_actor: Callable[[], Actor], memory: Memory) -> None:
+    """Put back the best agent so far; ``to_actor`` makes one of its kind."""
+    if memory.values["left"] is not None:
+        best.left, best.timesteps, best.actor = memory.values["left"], memory.values["timesteps"], to_actor()
+        best.actor.load_state_dict(_to_tensors(memory))
 
 
 _COUNTERS: Final = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")

@@ -35,6 +35,9 @@ class LearningOptions(RunOptions):
     practice: int = 0
     """Learn from so many scenarios, in half of which the winch saturates, again and again, by the share of the heave
     that is left in each; the critic is told their waves to come. 0: from new scenarios as the task draws them."""
+    selected_by: int = 0
+    """Look at the agent now and then, the first time before it has learned, on so many scenarios of their own, in half
+    of which the winch saturates, and give the best that was seen. 0: give what is there at the end."""
     scenarios: Path | None = None
     """A TOML file with a scenario or a distribution of your own to learn from; by default the package's seas."""
     control_period: float = TaskConfig.control_period
@@ -81,6 +84,7 @@ class LearningOptions(RunOptions):
         require_choice("observation", self.observation, ("state", "sensors"))
         require_choice("action", self.action, ACTIONS)
         require_integer("practice", self.practice, low=0, high=10**6)
+        require_integer("selected_by", self.selected_by, low=0, high=10**5)
         require_number("control_period", self.control_period, "s", low=0.01, high=2.0)
         self.config  # noqa: B018 - raises here, before anything is written
         require_integer("batch_size", self.batch_size, low=2, high=10**9)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from stable_baselines3 import PPO
+from torch import nn
 
 from aframe_env.validation import require_choice, require_integer, require_number
 from train.learn.actor_critic import TwoPathPolicy
@@ -92,6 +93,9 @@ def build(options: Options) -> Learner:
     )
     policy = model.policy
     assert isinstance(policy, TwoPathPolicy)
+    if options.action == "predictive":
+        # Its base is hard to better: begin with just that, not beside it by what random weights add.
+        nn.init.zeros_(policy.action_net.weight)
     return Learner("PPO", model, rows, policy.to_actor)
 
 

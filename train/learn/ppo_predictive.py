@@ -20,6 +20,8 @@ class Options(ppo.Options):
     """Control steps to learn from, over all rows."""
     practice: int = 400
     """Learn from so many scenarios, in half of which the winch saturates."""
+    selected_by: int = 100
+    """Give the agent that leaves the least heave in so many scenarios of their own."""
     n_envs: int = 256
     """Rows of the environment."""
     n_steps: int = 64

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.config import TaskConfig
-from aframe_env.scenario import Scenario, ScenarioSource
+from aframe_env.scenario import Scenario
 from agents.control.optimum import required_speeds, saturating
 from agents.learned.agent import output_zero
 from agents.learned.features import FeatureConfig
@@ -56,7 +56,7 @@ class Practice:
     @classmethod
     def of(cls, config: TaskConfig, features: FeatureConfig, count: int, seed: int) -> Practice:
         """Draw ``count`` scenarios of the task, and find what an agent of output zero leaves in them."""
-        scenarios = _half_saturating(config.source, config, count, seed)
+        scenarios = half_saturating(config, SERIES + seed, count)
         still = np.maximum(run(DrumStill(), scenarios, config).rms, 1e-6)
         left = run(output_zero(features), scenarios, config).rms
         # The slope of the mean share that is left, √(mean square) / still, over a scenario's mean square.
@@ -73,9 +73,9 @@ class Practice:
         return np.asarray(self.waves[which, np.minimum(step, self.waves.shape[1] - 1)])
 
 
-def _half_saturating(source: ScenarioSource, config: TaskConfig, count: int, seed: int) -> list[Scenario]:
-    """Scenarios of which half saturate the winch, or as many as are found."""
-    drawn = drawn_scenarios(source, SERIES + seed, DRAWN * count)
+def half_saturating(config: TaskConfig, seed: int, count: int) -> list[Scenario]:
+    """Scenarios of the task of which half saturate the winch, or as many as are found."""
+    drawn = drawn_scenarios(config.source, seed, DRAWN * count)
     hard = saturating(drawn, config)
     chosen = np.flatnonzero(hard)[: count // 2].tolist()
     chosen += np.flatnonzero(~hard)[: count - len(chosen)].tolist()

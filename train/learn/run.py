@@ -14,15 +14,15 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 
 from aframe_env.validation import InvalidValue
-from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, load, serialise
-from agents.learned.feature_sets import feature_names
-from agents.learned.features import Action
+from agents.learned.agent import WEIGHTS, load
 from train.evaluate.run import evaluate
 from train.learn.checkpoint import Checkpoints, KeepCheckpoints, Stopped, can_be_kept, stop_by_signal
-from train.learn.learner import Learner, LearnerSpec, Rows
+from train.learn.learner import LearnerSpec, Rows
 from train.learn.logs import open_logger, require_logs
 from train.learn.options import LearningOptions
 from train.learn.registry import find_learner
+from train.learn.selection import KeepBest
+from train.learn.trained import best_policy, save
 from train.shared.cli import parse, read_options, to_mapping
 from train.shared.run_folder import (
     CONFIG,
@@ -30,19 +30,11 @@ from train.shared.run_folder import (
     open_run,
     user_errors,
     versions,
-    write_atomically,
     write_json,
-    write_text,
 )
 
 METRICS: Final = "metrics.json"
 EVALUATED: Final = "comparison.json"
-AGENT_NAMES: Final[dict[Action, str]] = {
-    "speed": "{}",
-    "residual": "residual {}",
-    "predictive": "predictive {}",
-}
-"""Names of agents by their action, to be filled in with the learner's."""
 
 
 class ShowReduction(BaseCallback):
@@ -75,34 +67,6 @@ class ShowReduction(BaseCallback):
             completed=min(self.num_timesteps, self._progress.tasks[0].total or 0),
             reduction=f"{reduction:6.1%}",
         )
-
-
-def to_policy(learner: Learner, options: LearningOptions) -> tuple[LearnedPolicy, bytes]:
-    """The agent as a policy, and the bytes of its weights."""
-    actor = learner.to_actor()
-    weights = serialise(actor)
-    card = AgentCard(
-        algorithm=AGENT_NAMES[options.action].format(learner.algorithm),
-        observation=options.observation,
-        sensors=options.features.sensors,
-        waves=options.features.waves,
-        action=options.action,
-        features=feature_names(options.features),
-        hidden=options.hidden,
-        squashed=actor.squashed,
-        control_period=options.control_period,
-        seed=options.seed,
-        timesteps=learner.model.num_timesteps,
-        versions=versions(),
-        sha256=digest(weights),
-    )
-    return LearnedPolicy(actor, card), weights
-
-
-def save(folder: Path, policy: LearnedPolicy, weights: bytes) -> None:
-    """Write the agent: weights first, the card that vouches for them last."""
-    write_atomically(folder / WEIGHTS, lambda path: path.write_bytes(weights))
-    write_text(folder / CARD, card_text(policy.card))
 
 
 def main(name: str) -> int:
@@ -210,16 +174,23 @@ def _learn(spec: LearnerSpec, options: LearningOptions, opened: Run, console: Co
     ):
         model.set_logger(logger)
         keep = KeepCheckpoints(checkpoints, learner, options.checkpoint_every, stop)
-        callbacks = CallbackList([ShowReduction(progress, options.timesteps, learner.rows), keep])
+        callbacks: list[BaseCallback] = [ShowReduction(progress, options.timesteps, learner.rows), keep]
+        if options.selected_by:
+            # Before the checkpoints, which keep what it finds.
+            callbacks.insert(0, select := KeepBest(learner, options))
         try:
             if isinstance(model, BaseAlgorithm):
-                model.learn(options.timesteps - begun, callback=callbacks, reset_num_timesteps=card is None)
+                model.learn(
+                    options.timesteps - begun, callback=CallbackList(callbacks), reset_num_timesteps=card is None
+                )
             else:
-                model.learn(options.timesteps, callback=callbacks)
+                model.learn(options.timesteps, callback=CallbackList(callbacks))
+            if options.selected_by:
+                select.look()
         except Stopped as signalled:
             stopped = signalled
     seconds = time.perf_counter() - begin
-    policy, weights = to_policy(learner, options)
+    policy, weights = best_policy(learner, options)
     save(folder, policy, weights)
     write_json(
         folder / METRICS,
@@ -228,6 +199,7 @@ def _learn(spec: LearnerSpec, options: LearningOptions, opened: Run, console: Co
             "training_seconds": round(seconds, 1),
             "checkpoint_seconds": round(keep.seconds, 1),
             "interrupted": stopped is not None,
+            **({"best_after": learner.best.timesteps, "heave_left": learner.best.left} if options.selected_by else {}),
         },
     )
     console.print(f"agent: {folder / WEIGHTS} after {model.num_timesteps:,} steps in {seconds:.0f} s")

@@ -25,7 +25,7 @@ from agents.policy import DrumStill
 from agents.rollout import HELD_OUT_SEED, drawn_scenarios, run
 from train.learn.learner import Search
 from train.learn.registry import LEARNERS, find_learner
-from train.learn.run import to_policy
+from train.learn.trained import to_policy
 from train.shared.cli import parse, to_toml
 from train.shared.markdown import table
 from train.shared.run_folder import command_line, user_errors, versions, write_json, write_text

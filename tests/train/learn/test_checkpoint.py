@@ -28,12 +28,12 @@ PPO = {"n_envs": 3, "n_steps": 8, "batch_size": 12, "n_epochs": 2, "horizon": 2.
 SAC = {"n_envs": 3, "learning_starts": 12, "replay": 60, "batch_size": 8, "horizon": 2.0}
 CASES: dict[str, tuple[LearnerSpec, dict[str, Any]]] = {
     "ppo": (ppo.SPEC, PPO),
-    "ppo on sensors": (ppo.SPEC, {**PPO, "observation": "sensors"}),
+    "ppo on sensors": (ppo.SPEC, {**PPO, "observation": "sensors", "selected_by": 2}),
     "ppo, predictive, on sensors": (
         ppo_predictive.SPEC,
-        {**PPO, "observation": "sensors", "practice": 4, "critic_first": 2, "horizon": 4.0},
+        {**PPO, "observation": "sensors", "practice": 4, "selected_by": 0, "critic_first": 2, "horizon": 4.0},
     ),
-    "ppo, predictive": (ppo_predictive.SPEC, {**PPO, "practice": 0}),
+    "ppo, predictive": (ppo_predictive.SPEC, {**PPO, "practice": 0, "selected_by": 0}),
     "sac": (sac.SPEC, SAC),
     "sac on sensors, speed": (sac.SPEC, {**SAC, "observation": "sensors", "action": "speed", "n_steps": 2}),
 }
