@@ -95,7 +95,7 @@ def build(options: Options) -> Learner:
     assert isinstance(policy, TwoPathPolicy)
     if options.action == "predictive":
         # Its base is hard to better: begin with just that, not beside it by what random weights add.
-        nn.init.zeros_(policy.action_net.weight)
+        nn.init.zeros_(policy.action_net.weight)  # type: ignore[arg-type]
     return Learner("PPO", model, rows, policy.to_actor)
 
 
