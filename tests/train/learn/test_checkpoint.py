@@ -54,6 +54,7 @@ def agent(folder: Path) -> bytes:
 def test_a_stopped_training_goes_on_to_the_same_agent(
     case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("train.learn.selection.LOOKS", 2)
     spec, options = options_of(case, tmp_path / "whole")
     assert train(spec, options, QUIET) == 0
     spec, options = options_of(case, tmp_path / "parts", checkpoint_every=0.0)
