@@ -26,14 +26,14 @@ from aframe_env.scenario import Crane, Scenario
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion
 from aframe_env.serialization import strict_converter, structure
 from aframe_env.validation import InvalidValue, require_number
-from agents import shipped
+from agents import cards, shipped
 from agents.drives.forecast import Harmonics
 from agents.drives.functions import RampedDrive
 from agents.drives.objectives import Objective, coarse_step
 from agents.drives.optimisation import optimise
 from agents.policy import FloatArray
 
-FORMAT: Final = 1
+FORMAT: Final = 2
 ARRAYS: Final = "drive_map.safetensors"
 CARD: Final = "drive_map.json"
 AXES: Final = ("amplitude", "period", "mass", "length")
@@ -203,22 +203,18 @@ def serialise(drive_map: DriveMap, command: str, versions: dict[str, str]) -> tu
     arrays["ratio"] = np.stack([drive_map.ratio.real, drive_map.ratio.imag], axis=-1)
     data = save_arrays(arrays)
     card = MapCard(command, versions, hashlib.sha256(data).hexdigest())
-    return data, json.dumps(asdict(card), indent=2, ensure_ascii=False) + "\n"
+    return data, json.dumps(cards.sealed(asdict(card)), indent=2, ensure_ascii=False) + "\n"
 
 
 def load(place: str | Path = shipped.DRIVE_MAP) -> DriveMap:
     """Load a map from its folder, or the shipped one. Raises InvalidValue where the files do not belong together."""
     path = shipped.folder(place)
     try:
-        text, data = (path / CARD).read_text(encoding="utf-8"), (path / ARRAYS).read_bytes()
+        text, data = (path / CARD).read_bytes(), (path / ARRAYS).read_bytes()
     except OSError as error:
         raise InvalidValue(f"no drive map in {str(path)!r}: {error}") from error
-    try:
-        card = structure(strict_converter(), json.loads(text), MapCard, str(path / CARD))
-    except ValueError as error:
-        raise InvalidValue(f"{path / CARD}: {error}") from error
-    if card.format != FORMAT:
-        raise InvalidValue(f"{path / CARD}: format = {card.format!r}: this version reads format {FORMAT}")
+    source = str(path / CARD)
+    card = structure(strict_converter(), cards.unsealed(text, source, FORMAT), MapCard, source)
     if hashlib.sha256(data).hexdigest() != card.sha256:
         raise InvalidValue(f"{path / ARRAYS}: does not match the sha256 in {CARD}: damaged or not its file")
     try:

@@ -19,7 +19,7 @@ from safetensors.torch import save as save_tensors
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.serialization import strict_converter, structure
 from aframe_env.validation import InvalidValue
-from agents import shipped
+from agents import cards, shipped
 from agents.control.expected_waves import ExpectedWaves
 from agents.learned.feature_policy import OnFeatures
 from agents.learned.feature_sets import feature_names
@@ -27,7 +27,7 @@ from agents.learned.features import Action, FeatureConfig
 from agents.learned.network import Actor
 from agents.policy import FloatArray, Knowledge
 
-FORMAT = 4
+FORMAT = 5
 WEIGHTS = "agent.safetensors"
 CARD = "agent.json"
 _BLOCK = 64
@@ -116,8 +116,8 @@ def digest(weights: bytes) -> str:
 
 
 def card_text(card: AgentCard) -> str:
-    """The card as JSON, lists of numbers on a line each."""
-    text = json.dumps(asdict(card), indent=2, ensure_ascii=False)
+    """The card as JSON with its digest, lists of numbers on a line each."""
+    text = json.dumps(cards.sealed(asdict(card)), indent=2, ensure_ascii=False)
     return re.sub(r"\[[^\[\]\"{}]*\]", lambda numbers: f"[{' '.join(numbers[0][1:-1].split())}]", text) + "\n"
 
 
@@ -130,8 +130,8 @@ def seeds(folder: str | Path) -> list[Path]:
 def load(agent: str | Path) -> LearnedPolicy:
     """Load a shipped agent by its name, as "ppo-sensors", or one from its folder.
 
-    The lowest seed where there are several. Raises InvalidValue where there is none, or files that do not belong
-    together.
+    The lowest seed where there are several. Raises InvalidValue where there is none, a card that was altered, or files
+    that do not belong together.
     """
     path = shipped.folder(agent)
     if not path.is_dir():
@@ -140,17 +140,12 @@ def load(agent: str | Path) -> LearnedPolicy:
     if not (path / CARD).is_file() and seeds(path):
         path = seeds(path)[0]
     try:
-        text = (path / CARD).read_text(encoding="utf-8")
+        text = (path / CARD).read_bytes()
         weights = (path / WEIGHTS).read_bytes()
     except OSError as error:
         raise InvalidValue(f"no agent in {str(path)!r}: {error}") from error
-    try:
-        data = json.loads(text)
-    except ValueError as error:
-        raise InvalidValue(f"{path / CARD}: not JSON: {error}") from error
-    card = structure(strict_converter(), data, AgentCard, str(path / CARD))
-    if card.format != FORMAT:
-        raise InvalidValue(f"{path / CARD}: format = {card.format!r}: this version reads format {FORMAT}")
+    source = str(path / CARD)
+    card = structure(strict_converter(), cards.unsealed(text, source, FORMAT), AgentCard, source)
     if digest(weights) != card.sha256:
         raise InvalidValue(f"{path / WEIGHTS}: does not match the sha256 in {CARD}: damaged or not its file")
     actor = Actor(len(card.features), card.hidden, squashed=card.squashed)

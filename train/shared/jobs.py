@@ -22,7 +22,7 @@ from typing import Any, Generic, TypeVar
 from rich.progress import Progress
 
 from aframe_env.validation import require_integer
-from train.shared.job_store import JobStore
+from train.shared.job_store import JobStore, NotStored
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -60,8 +60,8 @@ def run_jobs(
     ``fn``, items and results must be picklable. With a ``store``, what it already holds is not computed again and
     each result is kept as soon as it is there: interrupt or kill the process at any moment and call again. ``key``
     gives what identifies an item (plain data or a dataclass; by default the item itself); items of one key are
-    computed once. A job whose worker dies is tried up to ``attempts`` times in all, one that raises only once; the
-    rest is finished before ``JobsFailed`` reports them.
+    computed once. A job whose worker dies is tried up to ``attempts`` times in all, one that raises, or whose result
+    cannot be stored for its NaN or infinity, only once; the rest is finished before ``JobsFailed`` reports them.
     """
     require_integer("attempts", attempts, low=1, high=1000)
     require_integer("workers", 1 if workers is None else workers, low=1, high=4096)
@@ -82,9 +82,12 @@ def run_jobs(
             if isinstance(outcome, _Failure):
                 failures.append((job.index, outcome.error))
             else:
-                if store is not None:
-                    store.write(keys[job.index], outcome.value)
-                found[keys[job.index]] = outcome.value
+                try:
+                    if store is not None:
+                        store.write(keys[job.index], outcome.value)
+                    found[keys[job.index]] = outcome.value
+                except NotStored as error:
+                    failures.append((job.index, error))
             bars.advance(bar)
     if failures:
         raise JobsFailed(sorted(failures, key=lambda failure: failure[0]), len(items))

@@ -23,6 +23,7 @@ from llvmlite.binding import get_host_cpu_name
 
 from aframe_env.validation import InvalidValue
 from train.shared.cli import program, to_mapping, to_toml
+from train.shared.jobs import JobsFailed
 
 CONFIG: Final = "config.toml"
 _WHERE_AND_HOW: Final = ("out", "overwrite", "resume", "checkpoint_every", "log", "threads")
@@ -173,12 +174,12 @@ def _lock(folder: Path) -> None:
 
 @contextlib.contextmanager
 def user_errors() -> Iterator[None]:
-    """One line on standard error for bad input, a failing disk and a missing extra (status 2) and Ctrl-C (130)."""
+    """One line on standard error for bad input, a failing disk or job, a missing extra (status 2) and Ctrl-C (130)."""
     try:
         yield
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         raise SystemExit(130) from None
-    except (InvalidValue, OSError, DependencyNotInstalled) as error:
+    except (InvalidValue, OSError, DependencyNotInstalled, JobsFailed) as error:
         print(f"error: {error}", file=sys.stderr)
         raise SystemExit(2) from None

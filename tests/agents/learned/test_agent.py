@@ -12,7 +12,7 @@ from aframe_env import Crane, InvalidValue, Scenario, ScenarioDistribution, Winc
 from aframe_env.env import AFrameHeaveEnv
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import PULLEY_VELOCITY_Z
-from agents import FeaturePolicy
+from agents import FeaturePolicy, cards
 from agents.control.expected_waves import ExpectedWaves
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, load, serialise
 from agents.learned.feature_sets import feature_names
@@ -49,7 +49,9 @@ def agent(observation="state", hidden=8, action="residual"):
 
 def write(folder, policy, weights, **changes):
     (folder / WEIGHTS).write_bytes(weights)
-    (folder / CARD).write_text(json.dumps({**json.loads(card_text(policy.card)), **changes}))
+    card = json.loads(card_text(policy.card))
+    del card[cards.DIGEST]
+    (folder / CARD).write_text(json.dumps(cards.sealed({**card, **changes})))
 
 
 @pytest.mark.parametrize("action", ACTIONS)
@@ -73,7 +75,7 @@ def test_an_agent_comes_back_from_its_folder_as_it_was(observation, action, tmp_
     [
         ({"sha256": "0" * 64}, "does not match the sha256"),
         ({"format": 99}, "format = 99"),
-        ({"format": 3}, "this version reads format 4"),
+        ({"format": 4}, "this version reads format 5"),
         ({"action": "force"}, r"\[action\] force not in literal"),
         ({"waves": {**asdict(WAVES), "build_up": -1.0}}, "build_up = -1.0 s"),
         ({"hidden": "8"}, r"\[hidden\] '8': must be of type int"),

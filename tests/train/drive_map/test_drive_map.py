@@ -1,3 +1,4 @@
+import hashlib
 import json
 import os
 import signal
@@ -49,7 +50,8 @@ def test_a_build_that_is_killed_goes_on_where_it_was(tmp_path, monkeypatch, caps
     with sqlite3.connect(tmp_path / "nodes.sqlite") as database:
         for key, text in database.execute("SELECT key, result FROM results").fetchall():
             marked = json.dumps({**json.loads(text), "remaining": 0.125})
-            database.execute("UPDATE results SET result = ? WHERE key = ?", (marked, key))
+            digest = hashlib.sha256(f"{key} {marked}".encode()).hexdigest()
+            database.execute("UPDATE results SET result = ?, digest = ? WHERE key = ?", (marked, digest, key))
     monkeypatch.setattr("sys.argv", ["train.drive_map", *arguments(tmp_path), "--overwrite"])
     assert drive_map.main() == 0
     found = stored.load(tmp_path / "out")

@@ -1,15 +1,22 @@
 import os
+import random
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
+import hypothesis
+import numpy as np
+import numpy.typing as npt
 import pytest
+from hypothesis import strategies as st
 
 from aframe_env import InvalidValue
-from train.shared.job_store import JobStore
+from train.shared.job_store import JobStore, NotStored
 from train.shared.jobs import JobsFailed, WorkerDied, run_jobs
 
 
@@ -188,3 +195,114 @@ def test_a_store_that_is_something_else_is_refused(tmp_path):
 def test_bad_arguments_are_named(name, value):
     with pytest.raises(InvalidValue, match=f"{name} = 0: must be in"):
         run_jobs(squared, [], **{name: value})
+
+
+@dataclass(frozen=True)
+class Heard:
+    number: int
+    sound: npt.NDArray[np.float32]
+    whole: npt.NDArray[np.int64]
+
+
+def test_arrays_come_back_bit_for_bit(tmp_path):
+    heard = Heard(1, np.random.default_rng(0).normal(size=(3, 5)).astype(np.float32), np.arange(4)[::-2])
+    with JobStore(tmp_path / "cells.sqlite", Heard, "1") as store:
+        assert store.get("a", lambda: heard) is heard
+    with JobStore(tmp_path / "cells.sqlite", Heard, "1") as store:
+        again = store.get("a", lambda: pytest.fail("it is there"))
+    for name in ("sound", "whole"):
+        was, came = getattr(heard, name), getattr(again, name)
+        assert (came.dtype, came.shape, came.tobytes()) == (was.dtype, was.shape, was.tobytes())
+        assert came.flags.writeable
+
+
+@pytest.mark.parametrize(
+    "value", [Square(1, (float("nan"),)), Heard(1, np.array([1.0, np.inf], dtype=np.float32), np.arange(1))]
+)
+def test_nan_and_infinity_are_never_stored(value, tmp_path):
+    with JobStore(tmp_path / "cells.sqlite", type(value), "1") as store:
+        with pytest.raises(NotStored, match=r"the result of job '\w{12}' has NaN or infinity in it: it is not stored"):
+            store.write(store.key("a"), value)
+        assert store.read([store.key("a")]) == {}
+
+
+def not_finite_if_odd(number):
+    return number * (float("nan") if number % 2 else 1.0)
+
+
+def test_a_job_of_which_nan_comes_is_named_and_the_others_are_kept(tmp_path):
+    with JobStore(tmp_path / "cells.sqlite", float, "1") as store:
+        with pytest.raises(JobsFailed, match=r"1 of 3 jobs failed; the first, job 1: .*NaN"):
+            run_jobs(not_finite_if_odd, [0, 1, 2], store=store, workers=1)
+        assert store.read([store.key(n) for n in range(3)]) == {store.key(0): 0.0, store.key(2): 2.0}
+
+
+@pytest.mark.parametrize("column", ["key", "result", "digest"])
+def test_a_row_that_was_altered_is_named_and_computed_anew(column, tmp_path, capsys):
+    cells = [Cell(n, str(tmp_path)) for n in range(3)]
+    with store_in(tmp_path) as store:
+        for cell in cells:
+            store.get(cell, partial(squared, cell))
+        key = store.key(cells[1])
+    with sqlite3.connect(tmp_path / "cells.sqlite") as database:
+        database.execute(
+            f"UPDATE results SET {column} = replace({column}, substr({column}, 9, 1), '~') WHERE key = '{key}'"
+        )
+    capsys.readouterr()
+    with store_in(tmp_path) as store:
+        said = capsys.readouterr().err
+        assert [store.get(cell, partial(squared, cell)).value for cell in cells] == [0, 1, 4]
+    assert said.count("warning: store = ") == 1
+    assert "does not match its digest: it is computed anew" in said
+    assert computed(tmp_path) == [0, 1, 1, 2]
+    with store_in(tmp_path) as store:
+        assert len(store.read([store.key(cell) for cell in cells])) == 3
+    assert capsys.readouterr().err == ""
+
+
+def test_a_row_that_is_no_result_is_named_and_computed_anew(tmp_path, capsys):
+    with JobStore(tmp_path / "cells.sqlite", int, "1") as numbers, store_in(tmp_path) as squares:
+        key = squares.key("a")
+        numbers.write(key, 7)
+        assert squares.read([key]) == {}
+        assert f"job '{key[:12]}' holds no Square ('int' object has" in capsys.readouterr().err
+
+
+def test_no_damage_to_the_file_gives_a_wrong_result_or_hides_one(tmp_path, capsys):
+    with store_in(tmp_path) as store:
+        truth = {store.key(n): squared(Cell(n)) for n in range(60)}
+        for key, value in truth.items():
+            store.write(key, value)
+    whole = (tmp_path / "cells.sqlite").read_bytes()
+
+    @hypothesis.settings(max_examples=150, deadline=None)
+    @hypothesis.given(
+        place=st.integers(0, len(whole) - 1), seed=st.integers(0, 9), length=st.sampled_from([1, 1, 1, 4, 64, 4096])
+    )
+    def damaged(place, seed, length):
+        data = bytearray(whole)
+        data[place : place + length] = random.Random(seed).randbytes(len(data[place : place + length]))
+        (tmp_path / "cells.sqlite").write_bytes(data)
+        capsys.readouterr()
+        try:
+            with store_in(tmp_path) as store:
+                found = store.read(list(truth))
+        except InvalidValue as refused:
+            said = str(refused)
+        else:
+            said = ""
+        if said:
+            assert "delete it, and what it held is computed anew" in said
+            assert "\n" not in said
+            return
+        assert found.items() <= truth.items()
+        assert len(truth) - len(found) <= capsys.readouterr().err.count("warning: ")
+
+    damaged()
+
+
+def test_a_store_of_other_tables_is_refused(tmp_path):
+    with sqlite3.connect(tmp_path / "cells.sqlite") as database:
+        database.execute("CREATE TABLE results (key TEXT PRIMARY KEY, result TEXT NOT NULL) WITHOUT ROWID")
+    with pytest.raises(InvalidValue, match=r"not a results store, or damaged: delete it.*it holds other tables"):
+        store_in(tmp_path)
