@@ -5,6 +5,7 @@ A new kind of policy joins by one entry in ``REGISTRY``, one that lives in a fol
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import inspect
 import sys
@@ -92,6 +93,8 @@ class PolicySpec:
     """Control step that an agent was trained at, s; None: any."""
     text: str = ""
     """Name, folder or function that it was chosen by; empty where it was not."""
+    digest: str = ""
+    """Digest of the file that it comes from, the card's or the module's; empty for what needs none."""
 
 
 def _drum_still(context: BuildContext) -> Policy:
@@ -207,7 +210,7 @@ def choose(text: str) -> PolicySpec:
     folder = shipped.folder(before)
     kinds = _kinds_in(folder) if colon else {}
     if word in kinds:
-        return kinds[word](folder)
+        return _of_folder(folder, word)
     if kinds:
         known = " or ".join(repr(f":{each}") for each in kinds if each) or "nothing"
         raise InvalidValue(f"policy = {text!r}: behind this folder may stand {known}")
@@ -244,8 +247,10 @@ def _expanded(text: str) -> dict[str, str]:
 
 def as_spec(policy: Policy) -> PolicySpec:
     """Wrap a policy that exists already."""
-    period = policy.card.control_period if isinstance(policy, learned.LearnedPolicy) else None
-    return PolicySpec(policy.name, lambda context: policy, control_period=period)
+    period, digest = None, ""
+    if isinstance(policy, learned.LearnedPolicy):
+        period, digest = policy.card.control_period, learned.digest(learned.card_text(policy.card).encode())
+    return PolicySpec(policy.name, lambda context: policy, control_period=period, digest=digest)
 
 
 def _kinds_in(folder: Path) -> dict[str, Callable[[Path], PolicySpec]]:
@@ -253,10 +258,19 @@ def _kinds_in(folder: Path) -> dict[str, Callable[[Path], PolicySpec]]:
     return next((kinds for file, kinds in FOLDERS.items() if (folder / file).is_file()), {})
 
 
+def _of_folder(folder: Path, word: str) -> PolicySpec:
+    """Load the policy of that word from a folder; its card vouches for the other files."""
+    card, kinds = next((card, kinds) for card, kinds in FOLDERS.items() if (folder / card).is_file())
+    return replace(kinds[word](folder), digest=_digest(folder / card))
+
+
+def _digest(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
 def _from_folder(folder: Path) -> PolicySpec:
-    kinds = _kinds_in(folder)
-    if kinds:
-        return kinds[""](folder)
+    if _kinds_in(folder):
+        return _of_folder(folder, "")
     if learned.seeds(folder):
         return as_spec(learned.load(folder))
     raise InvalidValue(f"policy = {str(folder)!r}: no agent in this folder: it has none of {', '.join(FOLDERS)}")
@@ -301,11 +315,14 @@ def _from_module(text: str, module: str, attribute: str) -> PolicySpec:
     here = str(Path.cwd())
     sys.path.insert(0, here)
     try:
-        found = getattr(importlib.import_module(module), attribute)
+        imported = importlib.import_module(module)
+        found = getattr(imported, attribute)
     except (ImportError, AttributeError) as error:
         raise InvalidValue(f"policy = {text!r}: cannot be imported: {error}") from error
     finally:
         sys.path.remove(here)
+    source = inspect.getsourcefile(imported)
+    digest = _digest(Path(source)) if source else ""
     if isinstance(found, type) or not _is_policy(found):
         if not callable(found):
             raise InvalidValue(f"policy = {text!r}: is a {type(found).__name__}, must be a policy or callable")
@@ -313,13 +330,15 @@ def _from_module(text: str, module: str, attribute: str) -> PolicySpec:
         if needed > 2:
             raise InvalidValue(f"policy = {text!r}: takes {needed} arguments, must take (observation) or (…, time)")
         if needed > 0 and not isinstance(found, type):
-            return PolicySpec(text, lambda context: FunctionPolicy(text, found, _seen(context), takes_time=needed == 2))
+            return PolicySpec(
+                text, lambda context: FunctionPolicy(text, found, _seen(context), takes_time=needed == 2), digest=digest
+            )
         found = found()
         if not _is_policy(found):
             raise InvalidValue(
                 f"policy = {text!r}: made a {type(found).__name__}, must be a policy with name, knows, reset and act"
             )
-    return as_spec(found)
+    return replace(as_spec(found), digest=digest)
 
 
 def _seen(context: BuildContext) -> Knowledge:

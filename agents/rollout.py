@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -91,6 +91,13 @@ class Episodes:
         """(N,) root mean square depth error, m."""
         return np.sqrt(self.omega1 / self.duration)
 
+    @classmethod
+    def joined(cls, parts: Sequence[Episodes]) -> Episodes:
+        """Return the episodes of all parts, one after the other."""
+        names = [each.name for each in fields(cls) if each.name != "duration"]
+        arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+        return cls(duration=parts[0].duration, **arrays)
+
 
 def run(
     policy: Policy,
@@ -98,19 +105,21 @@ def run(
     config: TaskConfig | None = None,
     *,
     noise_seed: int = 0,
+    first: int = 0,
     progress: Callable[[int], object] | None = None,
     **arguments: Any,
 ) -> Episodes:
     """Run ``policy`` through every scenario, on the task of ``config`` but for these arguments of the environment.
 
-    ``noise_seed`` draws the sensors' noise, the same for every policy.
+    ``noise_seed`` draws the sensors' noise, the same for every policy; ``first`` is the place of the first scenario in
+    its series, by which the noise goes.
     """
     rows = len(scenarios)
     config = task_config(config, arguments)
     # A single scenario stands for all of them: their cranes' winches are alike. It has no sensors of its own.
     config = config.replaced(observation=config.sensors or "state", scenario=scenarios[0])
     simulation = Simulation(rows, config)
-    seeds = noise_seeds(noise_seed, rows)
+    seeds = noise_seeds(noise_seed, first + rows)[first:]
     simulation.reset_rows(np.arange(rows), list(zip(scenarios, seeds, strict=True)))
     policy.reset(scenarios, config.control_period)
     steps = simulation.episode_steps

@@ -24,7 +24,7 @@ from scipy.optimize import least_squares, minimize
 
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
-from agents.drives.functions import Drive, HarmonicDrive, SplineDrive
+from agents.drives.functions import HarmonicDrive, SplineDrive
 from agents.drives.guesses import Guess, excess, harmonic_guess, spline_guess, within_limits
 from agents.drives.objectives import FINE_STEP, Objective, Outcome, coarse_step
 
@@ -49,7 +49,7 @@ _PRICES = (10.0, 3.0, 1.0)  # of the excess over the winch's limits, in the roun
 class OptimisedDrive:
     """A drive, its objective, and its result on its scenario as it was optimised."""
 
-    drive: Drive
+    drive: SplineDrive | HarmonicDrive
     family: str
     """"spline" or "harmonic"."""
     objective: str
@@ -126,7 +126,7 @@ def optimise(
     if objective == "omega2":
         x = search.run(x, guess, "omega2", max_evaluations)
     kind = SplineDrive if family == "spline" else HarmonicDrive
-    drive: Drive = kind.from_variables(x, float(duration), free_start)
+    drive: SplineDrive | HarmonicDrive = kind.from_variables(x, float(duration), free_start)
     seconds = time.perf_counter() - begin
     outcome = Objective(scenario, duration, min(FINE_STEP, coarse.step), control_period).drive(drive)
     return OptimisedDrive(

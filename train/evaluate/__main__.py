@@ -18,7 +18,7 @@ from aframe_env.validation import InvalidValue
 from agents.registry import choose_all
 from train.evaluate.run import AFTER_TRAINING, HeldOut, require_period, run_all, write
 from train.shared.cli import parse
-from train.shared.run_folder import RunOptions, open_run, user_errors
+from train.shared.run_folder import RunOptions, open_jobs, user_errors
 
 REPORT_PACKAGES = ("jinja2", "plotly", "pyarrow")
 
@@ -66,11 +66,10 @@ def main() -> int:
         options, console = parse(Options, "train.evaluate", __doc__ or ""), Console()
         choices = choose_all(options.policies)
         require_period(choices, options.control_period)
-        opened = open_run(options, "train.evaluate")
-        opened.record(options)
+        opened = open_jobs(options, "train.evaluate", "comparison.json")
         folder = opened.folder
         try:
-            comparison = run_all(choices, options, console)
+            comparison = run_all(choices, options, console, jobs=opened.jobs)
             write(folder, comparison, console)
             if options.report:
                 # Imported late: they need the extra.
@@ -85,8 +84,9 @@ def main() -> int:
             elif needed := needed_for_the_report():
                 console.print(f"no report: it {needed}", markup=False)
         except KeyboardInterrupt:
-            console.print("interrupted: the comparison is not complete")
+            console.print("interrupted: what is finished is kept; the same command goes on from there")
             return 130
+        opened.finish()
     return 0
 
 

@@ -9,13 +9,16 @@ from pathlib import Path
 from typing import ClassVar, Final, Literal
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
+import aframe_env
+import agents
 from aframe_env import task
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_integer
 from agents.control.optimum import saturating
+from agents.drives.optimisation import OptimisedDrive
 from agents.drives.tuned import TUNED
 from agents.policy import Knowledge, Policy
 from agents.registry import DRUM_STILL, OPTIMUM, BuildContext, PolicySpec, as_spec, choose_all
@@ -23,6 +26,7 @@ from agents.rollout import Episodes, held_out_scenarios, run
 from train.evaluate.figure import comparison_figure
 from train.evaluate.statistics import Entry, Mask, Row, compare, compare_families
 from train.evaluate.tables import rich_table, write_comparison
+from train.shared.job_store import JOBS, JobStore, version_of
 from train.shared.jobs import run_jobs
 from train.shared.scenarios import ScenarioOptions
 
@@ -125,35 +129,74 @@ def require_period(specs: Sequence[PolicySpec], control_period: float) -> None:
             )
 
 
-def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console) -> Comparison:
-    """Run the drum still and every policy that was chosen over the held-out scenarios."""
+BLOCK: Final = 256
+"""Scenarios of a job: what an interruption can cost of a policy's run."""
+IN_MEMORY: Final = Path(":memory:")
+
+
+@dataclass(frozen=True)
+class _Ran:
+    """A policy's run over a block of the scenarios."""
+
+    knows: Knowledge
+    episodes: Episodes
+
+
+def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console, *, jobs: Path = IN_MEMORY) -> Comparison:
+    """Run the drum still and every policy that was chosen over the held-out scenarios.
+
+    What is finished, each policy's run over a block of scenarios and each drive that one needs, is kept in the file
+    ``jobs``, and not computed again.
+    """
     config = held_out.config
     scenarios = held_out_scenarios(config.source, held_out.number)
     first = scenarios[: held_out.privileged]
+    version = version_of(aframe_env, agents)
     entries = []
-    with Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
-    ) as progress:
+    with (
+        JobStore(jobs, _Ran, version) as ran,
+        JobStore(jobs, OptimisedDrive, version) as drives,
+        Progress(
+            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
+        ) as progress,
+    ):
         for spec in (DRUM_STILL, *(c for c in specs if c.name != DRUM_STILL.name)):
             mine = first if spec.for_each_scenario else scenarios
             if not mine:
                 continue
-            policy = spec.build(
-                BuildContext(
-                    scenarios=mine,
-                    config=config,
-                    spread=partial(run_jobs, progress=progress, description=f"{spec.name}: preparing"),
-                )
-            )
-            bar = progress.add_task(spec.name, total=config.steps)
-            episodes = run(
-                policy,
-                mine,
-                config.replaced(observation=observation_of(policy, config)),
-                progress=lambda step, bar=bar: progress.update(bar, completed=step),  # type: ignore[misc]
-            )
-            entries.append(Entry(spec.name, policy.knows, episodes, spec.text))
+            blocks = [range(begin, min(begin + BLOCK, len(mine))) for begin in range(0, len(mine), BLOCK)]
+            bar = progress.add_task(spec.name, total=len(blocks) * config.steps)
+            parts = []
+            for i, block in enumerate(blocks):
+                identity = [spec.name, spec.digest, config, block.start, len(block)]
+                parts.append(ran.get(identity, partial(_run_block, spec, config, mine, block, drives, progress, bar)))
+                progress.update(bar, completed=(i + 1) * config.steps)
+            episodes = Episodes.joined([part.episodes for part in parts])
+            entries.append(Entry(spec.name, parts[0].knows, episodes, spec.text))
     return Comparison(tuple(entries), tuple(scenarios), config)
+
+
+def _run_block(
+    spec: PolicySpec,
+    config: TaskConfig,
+    scenarios: Sequence[Scenario],
+    block: range,
+    drives: JobStore[OptimisedDrive],
+    progress: Progress,
+    bar: TaskID,
+) -> _Ran:
+    mine = scenarios[block.start : block.stop]
+    spread = partial(
+        run_jobs,
+        key=lambda scenario: [spec.name, config, scenario],
+        store=drives,
+        progress=progress,
+        description=f"{spec.name}: preparing",
+    )
+    policy = spec.build(BuildContext(scenarios=mine, config=config, spread=spread))
+    seen = config.replaced(observation=observation_of(policy, config))
+    episodes = run(policy, mine, seen, first=block.start, progress=lambda _: progress.advance(bar))
+    return _Ran(policy.knows, episodes)
 
 
 def observation_of(policy: Policy, config: TaskConfig) -> task.Observation:
@@ -176,4 +219,6 @@ def write(folder: Path, comparison: Comparison, console: Console) -> None:
 
 def evaluate(policy: Policy, folder: Path, held_out: HeldOut, console: Console) -> None:
     """Compare an agent with the drum still and the paper's drives, and write the comparison into ``folder``."""
-    write(folder, run_all([as_spec(policy), *choose_all(AFTER_TRAINING)], held_out, console), console)
+    specs = [as_spec(policy), *choose_all(AFTER_TRAINING)]
+    write(folder, run_all(specs, held_out, console, jobs=folder / JOBS), console)
+    (folder / JOBS).unlink()

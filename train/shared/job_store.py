@@ -170,7 +170,7 @@ def _is_array(kind: Any) -> bool:
 
 
 def _plain_array(array: npt.NDArray[Any]) -> dict[str, Any]:
-    if array.dtype.kind not in "biuf" or not np.isfinite(array).all():
+    if array.dtype.kind not in "biufc" or not np.isfinite(array).all():
         raise ValueError("must be an array of finite numbers")
     data = base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()
     return {"dtype": array.dtype.str, "shape": list(array.shape), "base64": data}

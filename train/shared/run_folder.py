@@ -23,10 +23,11 @@ from llvmlite.binding import get_host_cpu_name
 
 from aframe_env.validation import InvalidValue
 from train.shared.cli import program, to_mapping, to_toml
+from train.shared.job_store import JOBS
 from train.shared.jobs import JobsFailed
 
 CONFIG: Final = "config.toml"
-_WHERE_AND_HOW: Final = ("out", "overwrite", "resume", "checkpoint_every", "log", "threads")
+_WHERE_AND_HOW: Final = ("out", "overwrite", "resume", "checkpoint_every", "log", "threads", "workers")
 """Options that do not change what is computed."""
 _LOCKS: Final[dict[Path, int]] = {}
 """Handles of the folders that this process has locked."""
@@ -123,6 +124,30 @@ class Run:
         """Write run.json: the command line, ``more``, and the versions; then config.toml, which ``--config`` reads."""
         write_json(self.folder / "run.json", {"command": self.command, **more, "versions": versions()})
         write_text(self.folder / CONFIG, to_toml(options))
+
+    @property
+    def jobs(self) -> Path:
+        """Store of the jobs that are finished; it is there until the run is."""
+        return self.folder / JOBS
+
+    def finish(self) -> None:
+        """Remove the store: the run's results are written."""
+        self.jobs.unlink(missing_ok=True)
+
+
+def open_jobs(options: RunOptions, name: str, result: str, **more: Any) -> Run:
+    """Make the folder of a run whose jobs are kept in ``Run.jobs``, and record it; or take it up.
+
+    ``result``: a file that a finished run has; its command is then refused. ``more`` is for run.json.
+    """
+    run = open_run(options, name, goes_on=True)
+    if not run.taken_up:
+        run.finish()
+        (run.folder / result).unlink(missing_ok=True)
+        run.record(options, **more)
+    elif (run.folder / result).exists() and not run.jobs.exists():
+        raise InvalidValue(f"out = {str(run.folder)!r}: this run is finished; pass --overwrite to do it again")
+    return run
 
 
 def open_run(options: RunOptions, name: str, *, goes_on: bool = False) -> Run:
