@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, Literal, Protocol, TypeVar
+from typing import Any, Final, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +29,7 @@ from agents.control.optimum import CommandSequence, optimise
 from agents.control.predictive import PlanningConfig, PredictiveControl
 from agents.drives import map as drive_map
 from agents.drives.map_policy import DriveMapPolicy
-from agents.drives.optimisation import Optimiser
+from agents.drives.optimisation import OptimisedDrive, Optimiser
 from agents.drives.policy import DrivePolicy
 from agents.drives.realtime_map import RealTimeMapPolicy
 from agents.drives.tuned import TUNED, Tuned, optimised, optimised_as_played
@@ -37,21 +37,20 @@ from agents.learned import agent as learned
 from agents.learned.features import FeatureConfig
 from agents.policy import DrumStill, FloatArray, Knowledge, Policy
 
-Item = TypeVar("Item")
-Result = TypeVar("Result")
-
 
 class Spread(Protocol):
-    """Map of a picklable function over items, perhaps in parallel; the results are in the items' order."""
+    """Map of a picklable search for a drive over scenarios, perhaps in parallel; the results are in their order."""
 
-    def __call__(self, function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-        """Return ``[function(item) for item in items]``."""
+    def __call__(
+        self, search: Callable[[Scenario], OptimisedDrive], scenarios: Sequence[Scenario]
+    ) -> list[OptimisedDrive]:
+        """Return ``[search(scenario) for scenario in scenarios]``."""
         ...
 
 
-def in_turn(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-    """Call the function on one item after the other."""
-    return [function(item) for item in items]
+def in_turn(search: Callable[[Scenario], OptimisedDrive], scenarios: Sequence[Scenario]) -> list[OptimisedDrive]:
+    """Search for one drive after the other."""
+    return [search(scenario) for scenario in scenarios]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +62,7 @@ class BuildContext:
     config: TaskConfig
     """The task; its observation is what a policy sees that is not made for another."""
     spread: Spread = in_turn
-    """Map over independent computations, for policies that take many of them to build."""
+    """Map over the searches of a policy that takes many of them to build."""
 
     @property
     def nominal(self) -> Scenario:

@@ -1,8 +1,8 @@
 """Gauss-Newton beside Nelder-Mead, on the paper's case and on held-out seas: ``python -m train.optimisers``.
 
 Writes comparison.json and comparison.md (evaluations and least Ω1 of each; then, under the winch's limits, how many
-intervals and harmonics pay), jobs.sqlite (finished searches of the second part: it resumes) and run.json into the
-output folder.
+intervals and harmonics pay) and run.json into the output folder. Finished searches are kept: the same command goes on
+after an interruption.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
+import agents
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.validation import require_integer
 from agents.control.optimum import optimise as best_commands
 from agents.control.optimum import saturating
-from agents.drives import following, functions, guesses, objectives, optimisation
 from agents.drives.objectives import Objective, coarse_step
 from agents.drives.optimisation import FAMILIES, OPTIMISERS, Family, Optimiser, optimise
 from agents.drives.tuned import EVALUATIONS
@@ -34,7 +34,7 @@ from train.shared.cli import parse
 from train.shared.job_store import JobStore, version_of
 from train.shared.jobs import run_jobs
 from train.shared.markdown import table
-from train.shared.run_folder import RunOptions, open_run, user_errors, write_json, write_text
+from train.shared.run_folder import RunOptions, open_jobs, user_errors, write_json, write_text
 from train.shared.scenarios import ScenarioOptions
 
 
@@ -221,8 +221,8 @@ winch-limited optimum's. A drive is judged by what the winch makes of it, from r
 """
 
 
-def study_limits(options: Options, folder: Path, progress: Progress) -> str:
-    """Second part of comparison.md: drives under the winch's limits; finished searches are kept in ``folder``."""
+def study_limits(options: Options, jobs: Path, progress: Progress) -> str:
+    """Second part of comparison.md: drives under the winch's limits; finished searches are kept in ``jobs``."""
     numbers = range(options.first_limited, options.first_limited + options.limited)
     if not numbers:
         return ""
@@ -239,11 +239,11 @@ def study_limits(options: Options, folder: Path, progress: Progress) -> str:
         for optimiser in OPTIMISERS
         for scenario in numbers
     ]
-    version = version_of(following, functions, guesses, objectives, optimisation)
-    with JobStore(folder / "jobs.sqlite", Played, version) as store:
+    with JobStore(jobs, Played, version_of(agents)) as store:
         found = run_jobs(
             partial(solve_limited, options.source),
             searches,
+            lambda search: [options.source, search],
             store=store,
             workers=options.workers,
             progress=progress,
@@ -257,7 +257,7 @@ def main() -> int:
     """Run the command."""
     with user_errors():
         options, console = parse(Options, "train.optimisers", __doc__ or ""), Console()
-        opened = open_run(options, "train.optimisers")
+        opened = open_jobs(options, "train.optimisers", "comparison.json")
         searches = [
             Search(scenario=scenario, family=family, optimiser=optimiser, max_evaluations=options.max_evaluations)
             for scenario in (None, *range(options.number))
@@ -265,23 +265,25 @@ def main() -> int:
             for optimiser in OPTIMISERS
         ]
         try:
-            with Progress(console=console) as progress:
+            with Progress(console=console) as progress, JobStore(opened.jobs, Found, version_of(agents)) as store:
                 found = run_jobs(
                     partial(solve, options.source),
                     searches,
+                    lambda search: [options.source, search],
+                    store=store,
                     workers=options.workers,
                     progress=progress,
                     description="searches",
                 )
-                limited = study_limits(options, opened.folder, progress)
+                limited = study_limits(options, opened.jobs, progress)
         except KeyboardInterrupt:
-            console.print("interrupted: nothing was written")
+            console.print("interrupted: what is finished is kept; the same command goes on from there")
             return 130
         text = INTRODUCTION.format(command=opened.command, limit=options.max_evaluations) + markdown(found) + limited
         console.print(text, soft_wrap=True, markup=False)
         write_text(opened.folder / "comparison.md", text)
         write_json(opened.folder / "comparison.json", [asdict(each) for each in found])
-        opened.record(options)
+        opened.finish()
     return 0
 
 

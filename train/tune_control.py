@@ -12,6 +12,7 @@ import io
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -20,6 +21,8 @@ from rich.console import Console
 from rich.progress import Progress
 from scipy.optimize import minimize
 
+import aframe_env
+import agents
 from aframe_env import task
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import Sensors
@@ -34,7 +37,8 @@ from agents.control.regulator import Gains
 from agents.policy import DrumStill, FloatArray, Policy
 from agents.rollout import HELD_OUT_SEED, drawn_scenarios, run
 from train.shared.cli import parse
-from train.shared.run_folder import RunOptions, open_run, user_errors, write_text
+from train.shared.job_store import JobStore, version_of
+from train.shared.run_folder import RunOptions, open_jobs, user_errors, write_text
 from train.shared.scenarios import ScenarioOptions
 
 Name = Literal["state", "sensors", "predictive-state", "predictive-sensors", "inverse-dynamics"]
@@ -112,8 +116,9 @@ class Trial:
     """Least heave reduction."""
 
 
-def study(tunable: Tunable, options: Options, tried: Callable[[Trial], object]) -> list[Trial]:
-    """Every trial of the search for one policy's gains; ``tried`` is called after each."""
+def study(name: Name, options: Options, store: JobStore[Trial], tried: Callable[[], object]) -> list[Trial]:
+    """Every trial of the search for one policy's gains; ``tried`` is called after each. ``store`` keeps them."""
+    tunable = TUNABLE[name]
     scenarios = drawn_scenarios(options.source, options.seed, options.number)
     config = TaskConfig(scenario=options.source)
     sensors = config.replaced(observation="sensors").sensors or Sensors()
@@ -122,11 +127,9 @@ def study(tunable: Tunable, options: Options, tried: Callable[[Trial], object]) 
     best = 1.0 - np.sqrt(optimise(scenarios, config).omega1 / config.duration) / still
     trials: list[Trial] = []
 
-    def score(x: FloatArray) -> float:
-        effort, share = np.clip(10.0 ** np.append(x, 0.0)[:2], (1e-7, 1e-3), (1e3, 1.0)).tolist()
-        gains = Gains(effort=effort, share=share)
+    def trial_of(gains: Gains) -> Trial:
         left = run(tunable.make(gains, sensors, waves), scenarios, observation=tunable.observation).rms / still
-        trial = Trial(
+        return Trial(
             gains=gains,
             share=float(np.mean((1.0 - left) / best)),
             mean=float(np.mean(1.0 - left)),
@@ -134,8 +137,13 @@ def study(tunable: Tunable, options: Options, tried: Callable[[Trial], object]) 
             fifth=float(np.quantile(1.0 - left, 0.05)),
             worst=float(1.0 - left.max()),
         )
+
+    def score(x: FloatArray) -> float:
+        effort, share = np.clip(10.0 ** np.append(x, 0.0)[:2], (1e-7, 1e-3), (1e3, 1.0)).tolist()
+        gains = Gains(effort=effort, share=share)
+        trial = store.get([name, gains, config, options.seed, options.number], lambda: trial_of(gains))
         trials.append(trial)
-        tried(trial)
+        tried()
         return -trial.share
 
     start = np.log10([tunable.start.effort, tunable.start.share])
@@ -155,15 +163,17 @@ def main() -> int:
     """Run the command."""
     with user_errors():
         options, console = parse(Options, "train.tune_control", __doc__ or ""), Console()
-        opened = open_run(options, "train.tune_control")
-        opened.record(options)
+        opened = open_jobs(options, "train.tune_control", "trials.csv")
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(["policy", "effort_s2", "share", "share_of_optimum", "mean", "median", "fifth", "worst"])
-        with Progress(console=console) as progress:
+        with (
+            Progress(console=console) as progress,
+            JobStore(opened.jobs, Trial, version_of(aframe_env, agents)) as store,
+        ):
             for name in options.policies:
                 bar = progress.add_task(name, total=options.evaluations)
-                trials = study(TUNABLE[name], options, lambda _, bar=bar: progress.advance(bar))  # type: ignore[misc]
+                trials = study(name, options, store, partial(progress.advance, bar))
                 for t in trials:
                     values = (t.gains.effort, t.gains.share, t.share, t.mean, t.median, t.fifth, t.worst)
                     writer.writerow([name, *(f"{v:.6g}" for v in values)])
@@ -173,7 +183,8 @@ def main() -> int:
                     f"{name}: {best.gains}: share of the optimum {best.share:.2%}, mean {best.mean:.2%}, "
                     f"median {best.median:.2%}, 5th percentile {best.fifth:.1%}, worst {best.worst:.1%}"
                 )
-                write_text(opened.folder / "trials.csv", text.getvalue())
+        write_text(opened.folder / "trials.csv", text.getvalue())
+        opened.finish()
     return 0
 
 

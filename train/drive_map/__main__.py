@@ -24,7 +24,7 @@ from aframe_env.validation import InvalidValue, require_integer, require_number
 from agents.drives import functions, objectives, optimisation
 from agents.drives import map as module
 from agents.drives.map import ARRAYS, CARD, DriveMap, Node, NodeDrive, optimise_node, serialise
-from train.drive_map.between_nodes import between_nodes, check
+from train.drive_map.between_nodes import Checked, HeldOut, between_nodes, check
 from train.drive_map.figures import draw
 from train.drive_map.notes import notes
 from train.drive_map.seas import compare_in
@@ -33,7 +33,7 @@ from train.shared.job_store import JobStore, version_of
 from train.shared.jobs import run_jobs
 from train.shared.run_folder import (
     RunOptions,
-    open_run,
+    open_jobs,
     user_errors,
     versions,
     write_atomically,
@@ -103,7 +103,7 @@ def assemble(options: Options, found: list[NodeDrive]) -> DriveMap:
 
 def run(options: Options, console: Console) -> int:
     """Build, test, write; return the exit status."""
-    opened = open_run(options, "train.drive_map")
+    opened = open_jobs(options, "train.drive_map", "notes.md", seed=options.seed)
     folder, command = opened.folder, opened.command
     version = version_of(module, functions, objectives, optimisation)
     nodes, crane = options.nodes, options.source.crane
@@ -117,25 +117,32 @@ def run(options: Options, console: Console) -> int:
                 )
             rate = fresh / (time.perf_counter() - begin)
             drive_map = assemble(options, found)
-            held_out = run_jobs(
-                check,
-                between_nodes(drive_map, crane, options.held_out, options.seed),
-                workers=options.workers,
-                progress=bars,
-                description="between the nodes",
-            )
-            seas = compare_in(drive_map, folder, options, options.workers, bars)
+            between = between_nodes(drive_map, crane, options.held_out, options.seed)
+            with JobStore(opened.jobs, Checked, version) as answers:
+                checked = run_jobs(
+                    check,
+                    between,
+                    store=answers,
+                    workers=options.workers,
+                    progress=bars,
+                    description="between the nodes",
+                )
+            held_out = [
+                HeldOut(each.optimum, each.ratio_error, each.remaining, where.node)
+                for where, each in zip(between, checked, strict=True)
+            ]
+            seas = compare_in(drive_map, opened, options, options.workers, bars)
     except KeyboardInterrupt:
-        console.print(f"interrupted: finished nodes are kept in {options.store}; the same command goes on from there")
+        console.print("interrupted: what is finished is kept; the same command goes on from there")
         return 130
     arrays, card = serialise(drive_map, command, versions())
     write_atomically(folder / ARRAYS, lambda temporary: temporary.write_bytes(arrays))
     write_text(folder / CARD, card)
     write_json(folder / "held_out.json", [each.plain for each in held_out])
-    opened.record(options, seed=options.seed)
     draw(folder / "drive_map.png", drive_map, crane, held_out, seas)
     text = notes(command, drive_map, crane, found, held_out, seas, fresh, rate)
     write_text(folder / "notes.md", text)
+    opened.finish()
     console.print(text, soft_wrap=True, markup=False)
     console.print(f"written: {folder}")
     return 0

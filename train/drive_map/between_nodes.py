@@ -29,22 +29,29 @@ class Between:
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class Checked:
     """The map's drive beside the optimum."""
 
-    node: Node
     optimum: NodeDrive
     ratio_error: float
     """\\|map's ratio - optimum's ratio\\|: share of the heave that the approximation misses."""
     remaining: float
     """RMS depth error under the map's drive over that with the drum still."""
 
+
+@dataclass(frozen=True)
+class HeldOut(Checked):
+    """The same, and where it is."""
+
+    node: Node
+
     @property
     def plain(self) -> dict[str, Any]:
         """Return it as plain data, the crane left out."""
         data = asdict(self)
-        del data["node"]["crane"]
-        return data
+        node = data.pop("node")
+        del node["crane"]
+        return {"node": node, **data}
 
 
 def between_nodes(drive_map: DriveMap, crane: Crane, count: int, seed: int) -> list[Between]:
@@ -64,7 +71,7 @@ def between_nodes(drive_map: DriveMap, crane: Crane, count: int, seed: int) -> l
     ]
 
 
-def check(between: Between) -> HeldOut:
+def check(between: Between) -> Checked:
     """Optimise a heave afresh and run the map's drive beside the optimum."""
     node = between.node
     optimum = optimise_node(node)
@@ -74,4 +81,4 @@ def check(between: Between) -> HeldOut:
     variables = np.array([amplitude, 2.0 * np.pi / node.period, cmath.phase(between.ratio)])
     outcome = objective.drive(RampedDrive(duration=duration, variables=variables))
     error = abs(between.ratio - complex(optimum.real, optimum.imaginary))
-    return HeldOut(node, optimum, error, outcome.rms / objective.still().rms)
+    return Checked(optimum, error, outcome.rms / objective.still().rms)

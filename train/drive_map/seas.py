@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
-from pathlib import Path
 
 from rich.progress import Progress
 
@@ -20,6 +19,7 @@ from agents.rollout import held_out_scenarios, run
 from train.evaluate.run import observation_of
 from train.evaluate.statistics import Entry, Row, compare
 from train.evaluate.tables import write_comparison
+from train.shared.run_folder import Run
 from train.shared.scenarios import ScenarioOptions
 from train.shared.tuned_drives import tune
 
@@ -49,13 +49,15 @@ class InSea:
 
 
 def compare_in(
-    drive_map: DriveMap, folder: Path, scenarios: ScenarioOptions, workers: int | None, progress: Progress
+    drive_map: DriveMap, opened: Run, scenarios: ScenarioOptions, workers: int | None, progress: Progress
 ) -> list[InSea]:
     """Run every policy over held-out scenarios of each kind of sea, and write a folder for each."""
     kinds, config = kinds_of(scenarios.source), TaskConfig(scenario=scenarios.source)
     drawn = {kind: held_out_scenarios(source, scenarios.number) for kind, source in kinds.items()}
     every = [scenario for each in drawn.values() for scenario in each]
-    tuned = tune(("S-Ω1",), every, config.duration, optimiser="gauss-newton", workers=workers, progress=progress)
+    tuned = tune(
+        ("S-Ω1",), every, config.duration, opened.jobs, optimiser="gauss-newton", workers=workers, progress=progress
+    )
     sensors = config.replaced(observation="sensors").sensors
     best = iter(tuned["S-Ω1"])
     bar = progress.add_task("seas", total=5 * len(kinds))
@@ -74,6 +76,6 @@ def compare_in(
             entries.append(Entry(policy.name, policy.knows, episodes))
             progress.advance(bar)
         rows = compare(entries, entries[0].episodes)
-        write_comparison(folder / kind.replace(" ", "-"), rows, rows, entries)
+        write_comparison(opened.folder / kind.replace(" ", "-"), rows, rows, entries)
         found.append(InSea(kind, entries, rows))
     return found

@@ -12,14 +12,18 @@ from dataclasses import asdict
 from rich.console import Console
 from rich.progress import Progress
 
+import aframe_env
+import agents
 from agents.drives import map as drive_map
 from agents.drives.tuned import TUNED
+from train.sensitivity.analysis import Sensitivity
 from train.sensitivity.figures import draw_curves, draw_indices
 from train.sensitivity.notes import notes
-from train.sensitivity.study import MAP, Job, Options, assumed_scenarios, still_rms, study
+from train.sensitivity.study import MAP, Job, Options, assumed_scenarios, identity, still_rms, study
 from train.shared.cli import parse
+from train.shared.job_store import JobStore, version_of
 from train.shared.jobs import run_jobs
-from train.shared.run_folder import open_run, user_errors, write_json, write_text
+from train.shared.run_folder import open_jobs, user_errors, write_json, write_text
 from train.shared.tuned_drives import tune
 
 
@@ -29,7 +33,7 @@ def main() -> int:
         options, console = parse(Options, "train.sensitivity", __doc__ or ""), Console()
         if MAP in options.policies:
             drive_map.load(options.drive_map)
-        opened = open_run(options, "train.sensitivity")
+        opened = open_jobs(options, "train.sensitivity", "notes.md", seed=options.seed)
         folder = opened.folder
         assumed = assumed_scenarios(options)
         still = tuple(still_rms(assumed).tolist())
@@ -40,21 +44,31 @@ def main() -> int:
                     names,
                     assumed,
                     options.config.duration,
+                    opened.jobs,
                     optimiser=options.optimiser,
                     workers=options.workers,
                     progress=bars,
                 )
                 jobs = [Job(name, tuple(tuned.get(name, ())), still, options) for name in options.policies]
-                studies = run_jobs(study, jobs, workers=options.workers, progress=bars, description="policies")
+                with JobStore(opened.jobs, Sensitivity, version_of(aframe_env, agents)) as store:
+                    studies = run_jobs(
+                        study,
+                        jobs,
+                        identity,
+                        store=store,
+                        workers=options.workers,
+                        progress=bars,
+                        description="policies",
+                    )
         except KeyboardInterrupt:
-            console.print("interrupted: nothing was written")
+            console.print("interrupted: what is finished is kept; the same command goes on from there")
             return 130
         write_json(folder / "sensitivity.json", [asdict(each) for each in studies])
-        opened.record(options, seed=options.seed)
         draw_curves(folder / "one_at_a_time.png", studies)
         draw_indices(folder / "sobol.png", studies)
         text = notes(opened.command, options.number, studies)
         write_text(folder / "notes.md", text)
+        opened.finish()
         console.print(text, soft_wrap=True, markup=False)
         console.print(f"written: {folder}")
     return 0

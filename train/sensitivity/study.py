@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -89,6 +89,14 @@ class Job:
     still: tuple[float, ...]
     """RMS depth error with the drum still in the assumed scenarios, m."""
     options: Options
+
+
+def identity(job: Job) -> list[Any]:
+    """What fixes a job: the task, the study's size and seed, and the policy with the files that it comes from."""
+    options = job.options
+    digest = "" if job.name in (STILL, *TUNED) else choose(options.drive_map if job.name == MAP else job.name).digest
+    size = (options.number, options.points, options.samples, options.seed)
+    return [job.name, digest, job.drives, options.config, *size]
 
 
 def _policy(job: Job) -> Policy:

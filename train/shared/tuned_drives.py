@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from rich.progress import Progress
 
+import agents
 from aframe_env.scenario import Scenario
 from agents.drives.optimisation import OptimisedDrive, Optimiser
 from agents.drives.tuned import TUNED, optimised
+from train.shared.job_store import JobStore, version_of
 from train.shared.jobs import run_jobs
 
 
@@ -29,13 +32,17 @@ def tune(
     names: Sequence[str],
     scenarios: Sequence[Scenario],
     duration: float,
+    store: Path,
     *,
     optimiser: Optimiser = "nelder-mead",
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> dict[str, list[OptimisedDrive]]:
-    """Drives of those names for each scenario, over ``duration`` s."""
+    """Drives of those names for each scenario, over ``duration`` s; what is found is kept in the file ``store``."""
     jobs = [_Job(name, scenario, duration, optimiser) for name in names for scenario in scenarios]
-    found = run_jobs(_solve, jobs, workers=workers, progress=progress, description="optimising drives")
+    with JobStore(store, OptimisedDrive, version_of(agents)) as drives:
+        found = run_jobs(
+            _solve, jobs, store=drives, workers=workers, progress=progress, description="optimising drives"
+        )
     count = len(scenarios)
     return {name: found[i * count : (i + 1) * count] for i, name in enumerate(names)}

@@ -17,6 +17,14 @@ from train.drive_map import __main__ as drive_map
 GRID = {"--amplitudes": (0.5, 3.0), "--periods": (6.0, 9.0, 14.0), "--masses": (2e4, 9e4), "--lengths": (60.0, 900.0)}
 
 
+class Killed(BaseException):
+    """What a process that is killed never sees."""
+
+
+def killed(*arguments):
+    raise Killed
+
+
 def arguments(folder):
     axes = [str(item) for name, values in GRID.items() for item in (name, *values)]
     few = ["--held-out", "3", "--scenarios", "2", "--workers", "1"]
@@ -52,7 +60,11 @@ def test_a_build_that_is_killed_goes_on_where_it_was(tmp_path, monkeypatch, caps
             marked = json.dumps({**json.loads(text), "remaining": 0.125})
             digest = hashlib.sha256(f"{key} {marked}".encode()).hexdigest()
             database.execute("UPDATE results SET result = ?, digest = ? WHERE key = ?", (marked, digest, key))
-    monkeypatch.setattr("sys.argv", ["train.drive_map", *arguments(tmp_path), "--overwrite"])
+    monkeypatch.setattr("sys.argv", ["train.drive_map", *arguments(tmp_path)])
+    with monkeypatch.context() as patched:
+        patched.setattr(drive_map, "draw", killed)
+        with pytest.raises(Killed):
+            drive_map.main()
     assert drive_map.main() == 0
     found = stored.load(tmp_path / "out")
     assert found.shape == (2, 3, 2, 2)
@@ -60,13 +72,17 @@ def test_a_build_that_is_killed_goes_on_where_it_was(tmp_path, monkeypatch, caps
     assert rows(tmp_path) == 24
     _the_map_is_right(found)
     notes = (tmp_path / "out" / "notes.md").read_text(encoding="utf-8")
-    assert f"This run optimised {24 - kept} of them" in notes
+    assert "All came from the store." in notes
     for name in ("drive map in real time", "drive map by the clock", "drive map, every wave known"):
         assert notes.count(f"\n| {name} |") == 3
     held_out = json.loads((tmp_path / "out" / "held_out.json").read_text())
     assert len(held_out) == 3
     assert all(each["remaining"] < 1e-3 for each in held_out)
     assert (tmp_path / "out" / "drive_map.png").read_bytes().startswith(b"\x89PNG")
+    assert not (tmp_path / "out" / "jobs.sqlite").exists()
+    with pytest.raises(SystemExit):
+        drive_map.main()
+    assert "this run is finished; pass --overwrite to do it again" in capsys.readouterr().err
 
 
 def _the_map_is_right(found):

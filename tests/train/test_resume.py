@@ -1,0 +1,77 @@
+"""Commands that are killed between their jobs: the same command goes on, and nothing is lost or done twice."""
+
+import importlib
+import json
+
+import pytest
+
+from train.shared.job_store import JobStore
+
+COMMANDS = {
+    "train.tune_control": ("--policies", "state", "inverse-dynamics", "--scenarios", "2", "--evaluations", "4"),
+    "train.sensitivity.__main__": (
+        *("--policies", "drum still", "H-Ω1", "drive map", "--scenarios", "1", "--points", "2"),
+        *("--samples", "2", "--optimiser", "gauss-newton", "--workers", "1"),
+    ),
+    "train.optimisers": (
+        *("--scenarios", "0", "--max-evaluations", "50", "--limited", "1", "--limited-evaluations", "2"),
+        *("--workers", "1"),
+    ),
+}
+
+
+class Killed(BaseException):
+    """What a process that is killed never sees."""
+
+
+def command(name, folder, monkeypatch):
+    folder.mkdir(exist_ok=True)
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr("sys.argv", [name, *COMMANDS[name], "--out", "out"])
+    return importlib.import_module(name).main()
+
+
+def without_seconds(data):
+    if isinstance(data, dict):
+        return {key: without_seconds(value) for key, value in data.items() if key != "seconds"}
+    return [without_seconds(each) for each in data] if isinstance(data, list) else data
+
+
+def files(folder, *, measured):
+    """What a run wrote; of one that measures seconds, all but those."""
+    found = {path.name: path.read_bytes() for path in (folder / "out").iterdir()}
+    if measured:
+        del found["comparison.md"]
+        found["comparison.json"] = without_seconds(json.loads(found["comparison.json"]))
+    return found
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_killed_command_goes_on_and_ends_with_the_same_bytes(name, tmp_path, monkeypatch, capsys):
+    pytest.importorskip("SALib", reason="needs the extra sensitivity")
+    write, written = JobStore.write, []
+
+    def kept(store, key, result):
+        write(store, key, result)
+        written.append(key)
+        if len(written) in deadly:
+            raise Killed
+
+    monkeypatch.setattr(JobStore, "write", kept)
+    deadly: tuple[int, ...] = ()
+    assert command(name, tmp_path / "whole", monkeypatch) == 0
+    jobs = len(written)
+    written.clear()
+    deadly = (1, jobs)
+    for _ in deadly:
+        with pytest.raises(Killed):
+            command(name, tmp_path / "parts", monkeypatch)
+    assert command(name, tmp_path / "parts", monkeypatch) == 0
+    assert len(set(written)) == len(written) == jobs
+    measured = name == "train.optimisers"
+    whole = files(tmp_path / "whole", measured=measured)
+    assert files(tmp_path / "parts", measured=measured) == whole
+    assert "jobs.sqlite" not in whole
+    with pytest.raises(SystemExit):
+        command(name, tmp_path / "parts", monkeypatch)
+    assert "this run is finished; pass --overwrite to do it again" in capsys.readouterr().err
