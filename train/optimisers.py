@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import ClassVar, Final
 
 import numpy as np
-from rich.console import Console
 from rich.progress import Progress
 
 from aframe_env.config import TaskConfig
@@ -31,6 +30,7 @@ from agents.policy import DrumStill
 from agents.rollout import held_out_scenarios, run
 from train.drives.experiment import paper_case
 from train.shared.cli import parse
+from train.shared.console import PlainConsole
 from train.shared.job_store import JobStore, version_of
 from train.shared.jobs import run_jobs
 from train.shared.markdown import table
@@ -256,7 +256,7 @@ def study_limits(options: Options, folder: Path, progress: Progress) -> str:
 def main() -> int:
     """Run the command."""
     with user_errors():
-        options, console = parse(Options, "train.optimisers", __doc__ or ""), Console()
+        options, console = parse(Options, "train.optimisers", __doc__ or ""), PlainConsole()
         opened = open_run(options, "train.optimisers")
         searches = [
             Search(scenario=scenario, family=family, optimiser=optimiser, max_evaluations=options.max_evaluations)
@@ -278,10 +278,10 @@ def main() -> int:
             console.print("interrupted: nothing was written")
             return 130
         text = INTRODUCTION.format(command=opened.command, limit=options.max_evaluations) + markdown(found) + limited
-        console.print(text, soft_wrap=True, markup=False)
         write_text(opened.folder / "comparison.md", text)
         write_json(opened.folder / "comparison.json", [asdict(each) for each in found])
         opened.record(options)
+        console.print(text, soft_wrap=True)
     return 0
 
 

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from rich.console import Console
 from rich.progress import Progress
 from scipy.optimize import minimize
 
@@ -34,6 +33,7 @@ from agents.control.regulator import Gains
 from agents.policy import DrumStill, FloatArray, Policy
 from agents.rollout import HELD_OUT_SEED, drawn_scenarios, run
 from train.shared.cli import parse
+from train.shared.console import PlainConsole
 from train.shared.run_folder import RunOptions, open_run, user_errors, write_text
 from train.shared.scenarios import ScenarioOptions
 
@@ -154,7 +154,7 @@ def study(tunable: Tunable, options: Options, tried: Callable[[Trial], object]) 
 def main() -> int:
     """Run the command."""
     with user_errors():
-        options, console = parse(Options, "train.tune_control", __doc__ or ""), Console()
+        options, console = parse(Options, "train.tune_control", __doc__ or ""), PlainConsole()
         opened = open_run(options, "train.tune_control")
         opened.record(options)
         text = io.StringIO()
@@ -167,13 +167,13 @@ def main() -> int:
                 for t in trials:
                     values = (t.gains.effort, t.gains.share, t.share, t.mean, t.median, t.fifth, t.worst)
                     writer.writerow([name, *(f"{v:.6g}" for v in values)])
+                write_text(opened.folder / "trials.csv", text.getvalue())
                 best = max(trials, key=lambda t: t.share)
                 progress.update(bar, completed=options.evaluations)
                 console.print(
                     f"{name}: {best.gains}: share of the optimum {best.share:.2%}, mean {best.mean:.2%}, "
                     f"median {best.median:.2%}, 5th percentile {best.fifth:.1%}, worst {best.worst:.1%}"
                 )
-                write_text(opened.folder / "trials.csv", text.getvalue())
     return 0
 
 

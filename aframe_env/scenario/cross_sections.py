@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass, field, fields
 from typing import NamedTuple, TypeAlias
 
-from aframe_env.validation import InvalidValue, require_number
+from aframe_env.validation import InvalidValue, require_number, shown
 
 
 class StressPoint(NamedTuple):
@@ -356,4 +356,4 @@ class FrameStructure:
             value = getattr(self, name)
             pieces = value if isinstance(value, tuple) else (value,)
             if not pieces or not all(isinstance(piece, Section) for piece in pieces):
-                raise InvalidValue(f"{name} = {value!r}: must be a section, or a tuple of one or more sections")
+                raise InvalidValue(f"{name} = {shown(value)}: must be a section, or a tuple of one or more sections")

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import TypeIs
 
-from aframe_env.validation import InvalidValue, require_choice, require_number
+from aframe_env.validation import InvalidValue, require_choice, require_number, shown
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -137,7 +137,7 @@ class HarmonicMotion:
     def __post_init__(self) -> None:
         for item in self.harmonics:
             if not isinstance(item, Harmonic):
-                raise InvalidValue(f"harmonics: {item!r} is not a Harmonic")
+                raise InvalidValue(f"harmonics: {shown(item)} is not a Harmonic")
 
     @classmethod
     def paper(cls) -> HarmonicMotion:

@@ -25,6 +25,7 @@ from scipy.interpolate import RegularGridInterpolator
 from aframe_env.scenario import Crane, Scenario
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion
 from aframe_env.serialization import strict_converter, structure
+from aframe_env.text import read_json
 from aframe_env.validation import InvalidValue, require_number
 from agents import shipped
 from agents.drives.forecast import Harmonics
@@ -210,13 +211,10 @@ def load(place: str | Path = shipped.DRIVE_MAP) -> DriveMap:
     """Load a map from its folder, or the shipped one. Raises InvalidValue where the files do not belong together."""
     path = shipped.folder(place)
     try:
-        text, data = (path / CARD).read_text(encoding="utf-8"), (path / ARRAYS).read_bytes()
-    except OSError as error:
+        data = (path / ARRAYS).read_bytes()
+    except (OSError, ValueError) as error:
         raise InvalidValue(f"no drive map in {str(path)!r}: {error}") from error
-    try:
-        card = structure(strict_converter(), json.loads(text), MapCard, str(path / CARD))
-    except ValueError as error:
-        raise InvalidValue(f"{path / CARD}: {error}") from error
+    card = structure(strict_converter(), read_json(path / CARD, "drive map"), MapCard, str(path / CARD))
     if card.format != FORMAT:
         raise InvalidValue(f"{path / CARD}: format = {card.format!r}: this version reads format {FORMAT}")
     if hashlib.sha256(data).hexdigest() != card.sha256:

@@ -18,6 +18,7 @@ from safetensors.torch import save as save_tensors
 
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.serialization import strict_converter, structure
+from aframe_env.text import read_json
 from aframe_env.validation import InvalidValue
 from agents import shipped
 from agents.control.expected_waves import ExpectedWaves
@@ -140,15 +141,10 @@ def load(agent: str | Path) -> LearnedPolicy:
     if not (path / CARD).is_file() and seeds(path):
         path = seeds(path)[0]
     try:
-        text = (path / CARD).read_text(encoding="utf-8")
         weights = (path / WEIGHTS).read_bytes()
     except OSError as error:
         raise InvalidValue(f"no agent in {str(path)!r}: {error}") from error
-    try:
-        data = json.loads(text)
-    except ValueError as error:
-        raise InvalidValue(f"{path / CARD}: not JSON: {error}") from error
-    card = structure(strict_converter(), data, AgentCard, str(path / CARD))
+    card = structure(strict_converter(), read_json(path / CARD, "agent"), AgentCard, str(path / CARD))
     if card.format != FORMAT:
         raise InvalidValue(f"{path / CARD}: format = {card.format!r}: this version reads format {FORMAT}")
     if digest(weights) != card.sha256:

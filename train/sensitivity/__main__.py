@@ -9,7 +9,6 @@ from __future__ import annotations
 import sys
 from dataclasses import asdict
 
-from rich.console import Console
 from rich.progress import Progress
 
 from agents.drives import map as drive_map
@@ -18,6 +17,7 @@ from train.sensitivity.figures import draw_curves, draw_indices
 from train.sensitivity.notes import notes
 from train.sensitivity.study import MAP, Job, Options, assumed_scenarios, still_rms, study
 from train.shared.cli import parse
+from train.shared.console import PlainConsole
 from train.shared.jobs import run_jobs
 from train.shared.run_folder import open_run, user_errors, write_json, write_text
 from train.shared.tuned_drives import tune
@@ -26,7 +26,7 @@ from train.shared.tuned_drives import tune
 def main() -> int:
     """Run the command."""
     with user_errors():
-        options, console = parse(Options, "train.sensitivity", __doc__ or ""), Console()
+        options, console = parse(Options, "train.sensitivity", __doc__ or ""), PlainConsole()
         if MAP in options.policies:
             drive_map.load(options.drive_map)
         opened = open_run(options, "train.sensitivity")
@@ -55,7 +55,7 @@ def main() -> int:
         draw_indices(folder / "sobol.png", studies)
         text = notes(opened.command, options.number, studies)
         write_text(folder / "notes.md", text)
-        console.print(text, soft_wrap=True, markup=False)
+        console.print(text, soft_wrap=True)
         console.print(f"written: {folder}")
     return 0
 
