@@ -59,20 +59,18 @@ def read_json(path: Path, name: str) -> Any:
 def read_csv(path: Path, name: str) -> Iterator[tuple[int, list[str]]]:
     """Number and cells, quoted or not, of each line of a CSV file that has something in it.
 
-    A comment, which ``#`` begins, is a single cell, without the quotes and empty cells that spreadsheets put around it.
+    A comment, which ``#`` begins, is a single cell, without the quotes and empty cells that spreadsheets give it.
     """
     for number, line in enumerate(io.StringIO(read_text(path, name, TABLE_LIMIT), newline=None), start=1):
         text = line.strip()
-        if text.lstrip('"').startswith("#"):
-            comment = text.rstrip(", \t")
-            yield number, [comment[1:].removesuffix('"') if comment.startswith('"') else comment]
-            continue
+        comment = text.lstrip('"').startswith("#")
         try:
-            cells = [cell.strip() for cell in next(csv.reader([text], skipinitialspace=True, strict=True), [])]
+            row = next(csv.reader([text], skipinitialspace=True, strict=not comment), [])
         except csv.Error as error:
             raise InvalidValue(f"{path}, line {number}: not CSV: {error}") from error
+        cells = [cell.strip() for cell in row]
         if any(cells):
-            yield number, cells
+            yield number, [", ".join(cells).rstrip(", ")] if comment else cells
 
 
 def _toml(text: str) -> Any:

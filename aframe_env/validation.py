@@ -80,6 +80,12 @@ def require_integer(name: str, value: Any, *, low: int, high: int) -> None:
         raise InvalidValue(f"{name} = {shown(value)}: must be in [{low}, {high}]")
 
 
+def require_instance(name: str, value: Any, kind: type) -> None:
+    """Raise unless ``value`` is a ``kind``."""
+    if not isinstance(value, kind):
+        raise InvalidValue(f"{name} = {shown(value)}: must be a {kind.__name__}")
+
+
 def require_vector(name: str, value: Any, unit: str, size: int = 3) -> None:
     """Raise unless ``value`` is a sequence of ``size`` finite numbers."""
     listed = isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim == 1)

@@ -334,9 +334,10 @@ def _somebodys(what: str) -> Iterator[None]:
     try:
         yield
     except (Exception, SystemExit) as error:
-        *_, place = traceback.extract_tb(error.__traceback__)
-        said = f"{type(error).__name__}: {error} ({place.filename}, line {place.lineno})"
-        raise InvalidValue(f"{what}: {said}") from error
+        frames = traceback.extract_tb(error.__traceback__)
+        theirs = [frame for frame in frames if frame.filename != __file__ and not frame.filename.startswith("<frozen")]
+        where = f" ({theirs[-1].filename}, line {theirs[-1].lineno})" if theirs else ""
+        raise InvalidValue(f"{what}: {type(error).__name__}: {error}{where}") from error
 
 
 def _seen(context: BuildContext) -> Knowledge:
