@@ -335,7 +335,8 @@ def _somebodys(what: str) -> Iterator[None]:
         yield
     except (Exception, SystemExit) as error:
         frames = traceback.extract_tb(error.__traceback__)
-        theirs = [frame for frame in frames if frame.filename != __file__ and not frame.filename.startswith("<frozen")]
+        ours = (__file__, importlib.__file__, "<frozen importlib._bootstrap>", "<frozen importlib._bootstrap_external>")
+        theirs = [frame for frame in frames if frame.filename not in ours]
         where = f" ({theirs[-1].filename}, line {theirs[-1].lineno})" if theirs else ""
         raise InvalidValue(f"{what}: {type(error).__name__}: {error}{where}") from error
 
