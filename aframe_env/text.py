@@ -21,7 +21,7 @@ from aframe_env.validation import InvalidValue
 DATA_LIMIT: Final = 4 * 2**20
 """Largest TOML or JSON file, bytes."""
 TABLE_LIMIT: Final = 128 * 2**20
-"""Largest CSV file, bytes: a motion at 10 Hz over three days."""
+"""Largest CSV file, bytes: a motion at 10 Hz over some two days."""
 DEPTH: Final = 32
 """Most levels of tables and lists within each other."""
 _LONG_KEY: Final = re.compile(rf"(?<![\w.-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEPTH}}}")
