@@ -20,7 +20,7 @@ from aframe_env.rfem.tables import readout_table, step_table
 from aframe_env.scenario import Scenario
 from aframe_env.scenario.crane import Frame
 from aframe_env.scenario.motion import Components
-from aframe_env.validation import InvalidValue, require_integer
+from aframe_env.validation import InvalidValue, require_integer, shown
 
 FLEXIBLE_STEP: Final = 0.0125
 """Longest inner step, s."""
@@ -50,18 +50,20 @@ def mesh_of(model: str, rfes: Sequence[int] | None, modes: int | None) -> Mesh |
     if model != "rfem":
         for name, value in (("rfes", rfes), ("rfem_modes", modes)):
             if value is not None:
-                raise InvalidValue(f'{name} = {value!r}: only with model="rfem"')
+                raise InvalidValue(f'{name} = {shown(value)}: only with model="rfem"')
         return None
     if modes is not None:
         require_integer("rfem_modes", modes, low=1, high=10_000)
     if rfes is None:
         return Mesh(Division(), modes)
     if not isinstance(rfes, tuple) or len(rfes) != 2:
-        raise InvalidValue(f"rfes = {rfes!r}: must be a tuple of two integers, the elements of a leg and of the beam")
+        raise InvalidValue(
+            f"rfes = {shown(rfes)}: must be a tuple of two integers, the elements of a leg and of the beam"
+        )
     require_integer("rfes (leg)", rfes[0], low=1, high=MOST_RFES)
     require_integer("rfes (beam)", rfes[1], low=2, high=MOST_RFES)
     if rfes[1] % 2:
-        raise InvalidValue(f"rfes = {rfes!r}: the beam's number must be even, for S to lie on its middle rfe")
+        raise InvalidValue(f"rfes = {shown(rfes)}: the beam's number must be even, for S to lie on its middle rfe")
     return Mesh(Division(leg=rfes[0], beam=rfes[1]), modes)
 
 

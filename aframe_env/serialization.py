@@ -1,9 +1,9 @@
-"""Plain data (TOML, JSON) and dataclasses: read, checked for types and keys, written; one clear error."""
+"""Plain data (of TOML, JSON) and dataclasses: each made of the other, checked for types and keys; one clear error."""
 
 from __future__ import annotations
 
 import re
-import tomllib
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,19 +12,9 @@ import numpy as np
 from cattrs import Converter, transform_error
 from cattrs.errors import BaseValidationError, ForbiddenExtraKeysError
 
-from aframe_env.validation import InvalidValue
+from aframe_env.validation import InvalidValue, shown
 
 T = TypeVar("T")
-
-
-def read_toml(path: Path, name: str) -> dict[str, Any]:
-    """Read a TOML file that the user calls ``name``. Raises ``InvalidValue``: no such file, or not TOML."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidValue(f"{name} = {str(path)!r}: cannot be read: {error}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise InvalidValue(f"{path}: not TOML: {error}") from error
 
 
 def strict_converter() -> Converter:
@@ -33,12 +23,15 @@ def strict_converter() -> Converter:
 
     def number(value: Any, _: type) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise InvalidValue(f"{value!r}: must be a number")
-        return float(value)
+            raise InvalidValue(f"{shown(value)}: must be a number")
+        try:
+            return float(value)
+        except OverflowError:
+            raise InvalidValue(f"{shown(value)}: must be a number within ±{sys.float_info.max:.2g}") from None
 
     def exactly(value: Any, kind: type) -> Any:
         if type(value) is not kind:
-            raise InvalidValue(f"{value!r}: must be of type {kind.__name__}")
+            raise InvalidValue(f"{shown(value)}: must be of type {kind.__name__}")
         return value
 
     converter.register_structure_hook(float, number)

@@ -19,7 +19,7 @@ from aframe_env.rfem.model import warn_of_rotation
 from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.scenario.motion import require_coverage
 from aframe_env.scenario.sensors import SensorBank
-from aframe_env.validation import InvalidValue
+from aframe_env.validation import InvalidValue, shown
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -94,7 +94,7 @@ class Simulation:
         if scenario is None:
             scenario = self.source if isinstance(self.source, Scenario) else self.source.draw(rng)
         elif not isinstance(scenario, Scenario):
-            raise InvalidValue(f"options['scenario'] = {scenario!r}: must be a Scenario")
+            raise InvalidValue(f"options['scenario'] = {shown(scenario)}: must be a Scenario")
         require_coverage(scenario.motion, "episode_duration", self.episode_duration)
         return scenario, noise_seed
 

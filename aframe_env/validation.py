@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from numbers import Real
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
+
+_INTEGERS: Final = (int, np.integer)
+_NUMBERS: Final = (float, np.float32, *_INTEGERS)
+"""What arithmetic with floats takes without loss: a half-precision 60000 times 9.81 is infinite."""
+_SHOWN: Final = 160
+"""Most characters of a value in a message."""
 
 
 class SmallRotationWarning(UserWarning):
@@ -21,6 +26,20 @@ class InvalidValue(ValueError):
 
 class UnexpectedArgument(InvalidValue, TypeError):
     """A keyword argument that there is not; a ``TypeError`` as Python's own is, which libraries go by."""
+
+
+def shown(value: object) -> str:
+    """Return a value as a message shows it: on one line, cut where it is long."""
+    try:
+        text = " ".join(repr(value).split())
+    except (ValueError, RecursionError):  # Python prints no integer of more than 4300 digits
+        return f"a {type(value).__name__} too long to print"
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 20]}...{text[-10:]}"
+
+
+def _is_one_of(kinds: tuple[type, ...], value: object) -> bool:
+    # Python counts True among the integers, NumPy spans of time.
+    return isinstance(value, kinds) and not isinstance(value, bool | np.timedelta64)
 
 
 def _interval(low: float, high: float, low_open: bool) -> str:
@@ -42,26 +61,36 @@ def require_number(
     if type(value) is float and low < value < high:
         return
     allowed = f"{_interval(low, high, low_open)} {unit}".rstrip()
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise InvalidValue(f"{name} = {value!r}: must be a number in {allowed}")
-    number = float(value)
+    if not _is_one_of(_NUMBERS, value):
+        raise InvalidValue(f"{name} = {shown(value)}: must be a number in {allowed}")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
     below = number <= low if low_open else number < low
     if not math.isfinite(number) or below or number > high:
-        raise InvalidValue(f"{name} = {value!r} {unit}".rstrip() + f": must be in {allowed}")
+        raise InvalidValue(f"{name} = {shown(value)} {unit}".rstrip() + f": must be in {allowed}")
 
 
 def require_integer(name: str, value: Any, *, low: int, high: int) -> None:
     """Raise unless ``value`` is an integer in [low, high]."""
-    if isinstance(value, bool) or not hasattr(value, "__index__"):
-        raise InvalidValue(f"{name} = {value!r}: must be an integer in [{low}, {high}]")
+    if not _is_one_of(_INTEGERS, value):
+        raise InvalidValue(f"{name} = {shown(value)}: must be an integer in [{low}, {high}]")
     if not low <= int(value) <= high:
-        raise InvalidValue(f"{name} = {value!r}: must be in [{low}, {high}]")
+        raise InvalidValue(f"{name} = {shown(value)}: must be in [{low}, {high}]")
+
+
+def require_instance(name: str, value: Any, kind: type) -> None:
+    """Raise unless ``value`` is a ``kind``."""
+    if not isinstance(value, kind):
+        raise InvalidValue(f"{name} = {shown(value)}: must be a {kind.__name__}")
 
 
 def require_vector(name: str, value: Any, unit: str, size: int = 3) -> None:
     """Raise unless ``value`` is a sequence of ``size`` finite numbers."""
-    if not hasattr(value, "__len__") or len(value) != size:
-        raise InvalidValue(f"{name} = {value!r}: must be {size} numbers in {unit}")
+    listed = isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim == 1)
+    if not listed or len(value) != size:
+        raise InvalidValue(f"{name} = {shown(value)}: must be {size} numbers in {unit}")
     for index, item in enumerate(value):
         require_number(f"{name}[{index}]", item, unit)
 
@@ -69,9 +98,12 @@ def require_vector(name: str, value: Any, unit: str, size: int = 3) -> None:
 def require_numbers(name: str, value: Any, unit: str) -> npt.NDArray[np.float64]:
     """Return an array of any shape as float64. Raises where it holds what is no number."""
     try:
-        return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidValue(f"{name} = {value!r}: must be an array of numbers, {unit}") from None
+        array = np.asarray(value)
+    except (TypeError, ValueError, OverflowError):
+        array = np.array(None)
+    if array.dtype.kind not in "iuf":
+        raise InvalidValue(f"{name} = {shown(value)}: must be an array of numbers, {unit}")
+    return array.astype(np.float64, copy=False)
 
 
 def require_known(arguments: Iterable[str], known: Iterable[str]) -> None:
@@ -84,5 +116,5 @@ def require_known(arguments: Iterable[str], known: Iterable[str]) -> None:
 
 def require_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:
     """Raise unless ``value`` is one of ``choices``."""
-    if value not in choices:
-        raise InvalidValue(f"{name} = {value!r}: must be one of {', '.join(map(repr, choices))}")
+    if not isinstance(value, str) or value not in choices:
+        raise InvalidValue(f"{name} = {shown(value)}: must be one of {', '.join(map(repr, choices))}")

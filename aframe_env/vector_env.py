@@ -19,7 +19,7 @@ from aframe_env.env import EnvState
 from aframe_env.rendering import open_renderer
 from aframe_env.scenario import Scenario
 from aframe_env.simulation import Simulation
-from aframe_env.validation import InvalidValue, require_choice, require_integer, require_numbers
+from aframe_env.validation import InvalidValue, require_choice, require_integer, require_numbers, shown
 
 if TYPE_CHECKING:
     from aframe_env.rendering.renderer import Renderer
@@ -239,7 +239,9 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
         if mask is None:
             return self._everything.copy()
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
-            raise InvalidValue(f"options['reset_mask'] = {mask!r}: must be a bool array of shape ({self.num_envs},)")
+            raise InvalidValue(
+                f"options['reset_mask'] = {shown(mask)}: must be a bool array of shape ({self.num_envs},)"
+            )
         if not mask.any():
             raise InvalidValue("options['reset_mask']: must select at least one row")
         return mask

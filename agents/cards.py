@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+from pathlib import Path
 from typing import Any, Final
 
+from aframe_env.text import read_json
 from aframe_env.validation import InvalidValue
 
 DIGEST: Final = "digest"
@@ -17,24 +19,18 @@ def sealed(card: dict[str, Any]) -> dict[str, Any]:
     return {**card, DIGEST: _digest(card)}
 
 
-def unsealed(text: bytes, source: str, form: int) -> dict[str, Any]:
-    """Return the card without its digest.
+def read(path: Path, name: str, form: int) -> dict[str, Any]:
+    """Read a card without its digest; ``name`` is what the user calls it, as in "agent".
 
-    Raises InvalidValue that begins with ``source``: not JSON, of another format than ``form``, or altered.
+    Raises InvalidValue with the file's name: not JSON, of another format than ``form``, or altered.
     """
-    try:
-        card = json.loads(text)
-        if not isinstance(card, dict):
-            raise InvalidValue(f"{source}: must be a table")
-        if card.get("format") != form:
-            raise InvalidValue(f"{source}: format = {card.get('format')!r}: this version reads format {form}")
-        stated = card.pop(DIGEST, None)
-        if stated != _digest(card):
-            raise InvalidValue(f"{source}: does not match its own digest: damaged or altered")
-    except InvalidValue:
-        raise
-    except (ValueError, RecursionError) as error:
-        raise InvalidValue(f"{source}: not JSON: {error}") from error
+    card = read_json(path, name)
+    if not isinstance(card, dict):
+        raise InvalidValue(f"{path}: must be a table")
+    if card.get("format") != form:
+        raise InvalidValue(f"{path}: format = {card.get('format')!r}: this version reads format {form}")
+    if card.pop(DIGEST, None) != _digest(card):
+        raise InvalidValue(f"{path}: does not match its own digest: damaged or altered")
     return card
 
 

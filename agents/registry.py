@@ -9,7 +9,9 @@ import hashlib
 import importlib
 import inspect
 import sys
-from collections.abc import Callable, Sequence
+import traceback
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -20,7 +22,7 @@ import numpy.typing as npt
 
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario, Sensors
-from aframe_env.validation import InvalidValue
+from aframe_env.validation import InvalidValue, require_numbers
 from agents import shipped
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.feedback import Feedback
@@ -277,25 +279,28 @@ def _from_folder(folder: Path) -> PolicySpec:
 
 @dataclass
 class FunctionPolicy:
-    """A function of the observations (N, K), and perhaps of the time, as a policy."""
+    """Somebody's function of the observations (N, K), and perhaps of the time, as a policy that is checked."""
 
     name: str
     function: Callable[..., Any]
     knows: Knowledge
     takes_time: bool
+    begin: Callable[[Sequence[Scenario], float], Any] | None = None
+    """What is to be called before N episodes."""
     rows: int = 0
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes."""
         self.rows = len(scenarios)
+        if self.begin is not None:
+            with _somebodys(self.name):
+                self.begin(scenarios, control_period)
 
     def act(self, observation: npt.NDArray[np.float32], time: float) -> FloatArray:
         """Drum speed commands of the function, checked: (N,) rad/s."""
-        said = self.function(observation, time) if self.takes_time else self.function(observation)
-        try:
-            speeds = np.asarray(said, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise InvalidValue(f"{self.name} gave {type(said).__name__}: must be drum speeds ({self.rows},)") from error
+        with _somebodys(self.name):
+            said = self.function(observation, time) if self.takes_time else self.function(observation)
+        speeds = require_numbers(f"drum speeds of {self.name}", said, f"({self.rows},) rad/s")
         if speeds.shape == (self.rows, 1):
             speeds = speeds[:, 0]
         if speeds.shape != (self.rows,):
@@ -314,10 +319,9 @@ def _from_module(text: str, module: str, attribute: str) -> PolicySpec:
     here = str(Path.cwd())
     sys.path.insert(0, here)
     try:
-        imported = importlib.import_module(module)
-        found = getattr(imported, attribute)
-    except (ImportError, AttributeError) as error:
-        raise InvalidValue(f"policy = {text!r}: cannot be imported: {error}") from error
+        with _somebodys(f"policy = {text!r}: cannot be imported"):
+            imported = importlib.import_module(module)
+            found = getattr(imported, attribute)
     finally:
         sys.path.remove(here)
     source = inspect.getsourcefile(imported)
@@ -332,12 +336,27 @@ def _from_module(text: str, module: str, attribute: str) -> PolicySpec:
             return PolicySpec(
                 text, lambda context: FunctionPolicy(text, found, _seen(context), takes_time=needed == 2), digest=digest
             )
-        found = found()
+        with _somebodys(f"policy = {text!r}: cannot be made"):
+            found = found()
         if not _is_policy(found):
             raise InvalidValue(
                 f"policy = {text!r}: made a {type(found).__name__}, must be a policy with name, knows, reset and act"
             )
-    return replace(as_spec(found), digest=digest)
+    policy = FunctionPolicy(found.name, found.act, found.knows, takes_time=True, begin=found.reset)
+    return replace(as_spec(found), build=lambda context: policy, digest=digest)
+
+
+@contextmanager
+def _somebodys(what: str) -> Iterator[None]:
+    """Say in one sentence what somebody's own code raised, and where."""
+    try:
+        yield
+    except (Exception, SystemExit) as error:
+        frames = traceback.extract_tb(error.__traceback__)
+        ours = (__file__, importlib.__file__, "<frozen importlib._bootstrap>", "<frozen importlib._bootstrap_external>")
+        theirs = [frame for frame in frames if frame.filename not in ours]
+        where = f" ({theirs[-1].filename}, line {theirs[-1].lineno})" if theirs else ""
+        raise InvalidValue(f"{what}: {type(error).__name__}: {error}{where}") from error
 
 
 def _seen(context: BuildContext) -> Knowledge:
@@ -345,7 +364,11 @@ def _seen(context: BuildContext) -> Knowledge:
 
 
 def _is_policy(thing: Any) -> bool:
-    return all(hasattr(thing, name) for name in ("name", "knows", "reset", "act"))
+    return (
+        isinstance(getattr(thing, "name", None), str)
+        and isinstance(getattr(thing, "knows", None), Knowledge)
+        and all(callable(getattr(thing, name, None)) for name in ("reset", "act"))
+    )
 
 
 def _required_arguments(function: Callable[..., Any]) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 import statistics
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from aframe_env.serialization import strict_converter, structure
-from aframe_env.validation import InvalidValue
+from aframe_env.text import read_json
 from train.shared.run_folder import versions, write_json
 
 NOT_ASKED: Final = "not measured in this run"
@@ -96,8 +95,4 @@ class Run:
     @classmethod
     def load(cls, path: Path) -> Run:
         """Read a file that ``save`` wrote."""
-        try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-        except json.JSONDecodeError as error:
-            raise InvalidValue(f"{path}: not JSON: {error}") from error
-        return structure(strict_converter(), data, cls, str(path))
+        return structure(strict_converter(), read_json(path, "run"), cls, str(path))

@@ -36,6 +36,7 @@ from agents.policy import DrumStill, Policy
 from agents.registry import BuildContext, PolicySpec, as_spec, choose, slug
 from train.evaluate.run import observation_of
 from train.shared.cli import parse
+from train.shared.console import PlainConsole
 from train.shared.run_folder import command_line, user_errors
 
 if TYPE_CHECKING:
@@ -343,7 +344,7 @@ def run(options: Options, console: Console) -> int:
 def main() -> int:
     """Run the command."""
     with user_errors():
-        return run(parse(Options, "train.dataset", __doc__ or ""), Console())
+        return run(parse(Options, "train.dataset", __doc__ or ""), PlainConsole())
 
 
 if __name__ == "__main__":

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import ClassVar, Final
 
 import numpy as np
-from rich.console import Console
 from rich.progress import Progress
 
 import agents
@@ -31,6 +30,7 @@ from agents.policy import DrumStill
 from agents.rollout import held_out_scenarios, run
 from train.drives.experiment import paper_case
 from train.shared.cli import parse
+from train.shared.console import PlainConsole
 from train.shared.job_store import JobStore, version_of
 from train.shared.jobs import run_jobs
 from train.shared.markdown import table
@@ -256,7 +256,7 @@ def study_limits(options: Options, jobs: Path, progress: Progress) -> str:
 def main() -> int:
     """Run the command."""
     with user_errors():
-        options, console = parse(Options, "train.optimisers", __doc__ or ""), Console()
+        options, console = parse(Options, "train.optimisers", __doc__ or ""), PlainConsole()
         opened = open_jobs(options, "train.optimisers", "comparison.json")
         searches = [
             Search(scenario=scenario, family=family, optimiser=optimiser, max_evaluations=options.max_evaluations)
@@ -280,10 +280,10 @@ def main() -> int:
             console.print("interrupted: what is finished is kept; the same command goes on from there")
             return 130
         text = INTRODUCTION.format(command=opened.command, limit=options.max_evaluations) + markdown(found) + limited
-        console.print(text, soft_wrap=True, markup=False)
         write_text(opened.folder / "comparison.md", text)
         write_json(opened.folder / "comparison.json", [asdict(each) for each in found])
         opened.finish()
+        console.print(text, soft_wrap=True)
     return 0
 
 

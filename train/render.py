@@ -23,6 +23,7 @@ from aframe_env import task
 from aframe_env.scenario import ScenarioDistribution
 from aframe_env.validation import InvalidValue, require_integer, require_number
 from train.shared.cli import parse
+from train.shared.console import PlainConsole
 from train.shared.run_folder import new_file, user_errors, write_atomically
 
 _CATCH_UP = 0.5
@@ -93,7 +94,7 @@ def run(options: Options, console: Console) -> int:
 def main() -> int:
     """Run the command."""
     with user_errors():
-        return run(parse(Options, "train.render", __doc__ or ""), Console())
+        return run(parse(Options, "train.render", __doc__ or ""), PlainConsole())
 
 
 if __name__ == "__main__":

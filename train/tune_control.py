@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from rich.console import Console
 from rich.progress import Progress
 from scipy.optimize import minimize
 
@@ -37,6 +36,7 @@ from agents.control.regulator import Gains
 from agents.policy import DrumStill, FloatArray, Policy
 from agents.rollout import HELD_OUT_SEED, drawn_scenarios, run
 from train.shared.cli import parse
+from train.shared.console import PlainConsole
 from train.shared.job_store import JobStore, version_of
 from train.shared.run_folder import RunOptions, open_jobs, user_errors, write_text
 from train.shared.scenarios import ScenarioOptions
@@ -162,7 +162,7 @@ def study(name: Name, options: Options, store: JobStore[Trial], tried: Callable[
 def main() -> int:
     """Run the command."""
     with user_errors():
-        options, console = parse(Options, "train.tune_control", __doc__ or ""), Console()
+        options, console = parse(Options, "train.tune_control", __doc__ or ""), PlainConsole()
         opened = open_jobs(options, "train.tune_control", "trials.csv")
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")

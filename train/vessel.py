@@ -24,6 +24,7 @@ from rich.progress import track
 from aframe_env.scenario.vessel import COLUMNS, Vessel
 from aframe_env.validation import InvalidValue, require_integer, require_number
 from train.shared.cli import parse
+from train.shared.console import PlainConsole
 from train.shared.run_folder import new_file, user_errors, write_atomically, write_text
 
 FloatArray = npt.NDArray[np.float64]
@@ -333,7 +334,7 @@ def run(options: Options, console: Console) -> int:
 def main() -> int:
     """Run the command."""
     with user_errors():
-        return run(parse(Options, "train.vessel", __doc__ or ""), Console())
+        return run(parse(Options, "train.vessel", __doc__ or ""), PlainConsole())
 
 
 if __name__ == "__main__":

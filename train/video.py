@@ -26,6 +26,7 @@ from aframe_env.rendering import open_painter, palette
 from aframe_env.validation import InvalidValue, require_integer, require_number
 from train.evaluate.one_episode import EpisodeOptions, begin
 from train.shared.cli import parse
+from train.shared.console import PlainConsole
 from train.shared.episode import Episode
 from train.shared.run_folder import new_file, user_errors, write_atomically
 
@@ -179,7 +180,7 @@ def run(options: Options, console: Console) -> int:
 def main() -> int:
     """Run the command."""
     with user_errors():
-        return run(parse(Options, "train.video", __doc__ or ""), Console())
+        return run(parse(Options, "train.video", __doc__ or ""), PlainConsole())
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from functools import cached_property
 
 from aframe_env.dynamics.start import free_length
 from aframe_env.scenario.cross_sections import FrameStructure
-from aframe_env.validation import InvalidValue, require_number, require_vector
+from aframe_env.validation import InvalidValue, require_instance, require_number, require_vector
 
 Vector = tuple[float, float, float]
 
@@ -44,6 +44,7 @@ class Frame:
         require_number("luffing_angle", self.luffing_angle, "rad", low=-1.4, high=1.4)
         require_number("servomotor_height", self.servomotor_height, "m", low=0.0, high=self.height, low_open=True)
         require_number("servomotor_deck_x", self.servomotor_deck_x, "m")
+        require_instance("structure", self.structure, FrameStructure)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,6 +113,9 @@ class Crane:
     """Drum H in {D}, m."""
 
     def __post_init__(self) -> None:
+        require_instance("frame", self.frame, Frame)
+        require_instance("rope", self.rope, Rope)
+        require_instance("winch", self.winch, Winch)
         require_vector("drum_position", self.drum_position, "m")
         if self.drum_to_pulley == 0.0:
             raise InvalidValue(f"drum_position = {self.drum_position} m: must not be the pulley's place")

@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass, field, fields
 from typing import NamedTuple, TypeAlias
 
-from aframe_env.validation import InvalidValue, require_number
+from aframe_env.validation import InvalidValue, require_instance, require_number, require_vector, shown
 
 
 class StressPoint(NamedTuple):
@@ -86,6 +86,9 @@ class GivenSection:
             require_number(item.name, getattr(self, item.name), unit, low=low, low_open=low == 0.0)
         if self.polar_moment is not None:
             require_number("polar_moment", self.polar_moment, "m⁴", low=0.0, low_open=True)
+        require_instance("stress_points", self.stress_points, tuple)
+        for index, point in enumerate(self.stress_points):
+            require_vector(f"stress_points[{index}]", point, "m, m, 1/m², 1/m² and 1/m³", size=5)
 
     @property
     def rotary_moment(self) -> float:
@@ -352,8 +355,10 @@ class FrameStructure:
     """Each of the two luffing cylinders."""
 
     def __post_init__(self) -> None:
+        require_instance("material", self.material, Material)
+        require_instance("servomotor", self.servomotor, Servomotor)
         for name in ("leg_section", "beam_section"):
             value = getattr(self, name)
             pieces = value if isinstance(value, tuple) else (value,)
             if not pieces or not all(isinstance(piece, Section) for piece in pieces):
-                raise InvalidValue(f"{name} = {value!r}: must be a section, or a tuple of one or more sections")
+                raise InvalidValue(f"{name} = {shown(value)}: must be a section, or a tuple of one or more sections")

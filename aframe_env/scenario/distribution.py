@@ -15,7 +15,7 @@ from aframe_env.scenario.scenario import Scenario
 from aframe_env.scenario.sea import FULL_TURN, Sea, SeaMotion, dnv_gamma
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.scenario.vessel import Vessel
-from aframe_env.validation import InvalidValue, require_integer, require_number
+from aframe_env.validation import InvalidValue, require_instance, require_integer, require_number, shown
 
 Range = float | tuple[float, float]
 """One exact value, or the interval that a value is drawn from uniformly."""
@@ -29,13 +29,13 @@ NUMBERS: Final = 3 * SUBSTREAM
 def _require_range(name: str, value: Any, unit: str, low: float, high: float, low_open: bool = False) -> None:
     if isinstance(value, tuple):
         if len(value) != 2:
-            raise InvalidValue(f"{name} = {value!r}: must be a number or a tuple (low, high) in {unit}")
+            raise InvalidValue(f"{name} = {shown(value)}: must be a number or a tuple (low, high) in {unit}")
         for part, item in zip(("low", "high"), value, strict=True):
             require_number(f"{name} ({part})", item, unit, low=low, high=high, low_open=low_open)
         if value[0] > value[1]:
-            raise InvalidValue(f"{name} = {value!r} {unit}: the low end is above the high end")
+            raise InvalidValue(f"{name} = {shown(value)} {unit}: the low end is above the high end")
     elif isinstance(value, list):
-        raise InvalidValue(f"{name} = {value!r}: must be a number or a tuple (low, high) in {unit}")
+        raise InvalidValue(f"{name} = {shown(value)}: must be a number or a tuple (low, high) in {unit}")
     else:
         require_number(name, value, unit, low=low, high=high, low_open=low_open)
 
@@ -87,19 +87,17 @@ class ScenarioDistribution:
         _require_range("hs", self.hs, "m", 0.0, 30.0)
         _require_range("tp", self.tp, "s", 2.0, 40.0)
         _require_range("heading", self.heading, "rad", -FULL_TURN, FULL_TURN)
-        if self.gamma != "dnv":
-            if isinstance(self.gamma, str):
-                raise InvalidValue(f"gamma = {self.gamma!r}: must be 'dnv', a number or a tuple (low, high) in [1, 10]")
+        if not isinstance(self.gamma, str):
             _require_range("gamma", self.gamma, "", 1.0, 10.0)
+        elif self.gamma != "dnv":
+            raise InvalidValue(f"gamma = {shown(self.gamma)}: must be 'dnv', a number or a tuple in [1, 10]")
         require_number("ramp", self.ramp, "s", low=0.0, high=1e4)
         _require_range("load_mass", self.load_mass, "kg", 0.0, 1e7, low_open=True)
         _require_range("rope_length", self.rope_length, "m", 0.0, 1e5, low_open=True)
         _require_range("rope_damping_ratio", self.rope_damping_ratio, "of critical", 0.0, 1.0)
         require_integer("components", self.components, low=1, high=4096)
-        if not isinstance(self.crane, Crane):
-            raise InvalidValue(f"crane = {self.crane!r}: must be a Crane")
-        if not isinstance(self.sensors, Sensors):
-            raise InvalidValue(f"sensors = {self.sensors!r}: must be Sensors")
+        require_instance("crane", self.crane, Crane)
+        require_instance("sensors", self.sensors, Sensors)
         require_number("window", self.window, "s", low=0.0, high=1e6, low_open=True)
         self._require_records()
         self._require_rope()
@@ -109,6 +107,7 @@ class ScenarioDistribution:
 
     def _require_records(self) -> None:
         """Raise where a record is none, or shorter than the stretch that is drawn from it, or a sea is given beside."""
+        require_instance("records", self.records, tuple)
         if not self.records:
             if self.window != ScenarioDistribution.window:
                 raise InvalidValue(f"window = {self.window:g} s: goes with records, and there are none")
@@ -119,8 +118,7 @@ class ScenarioDistribution:
                     f"{name} = {getattr(self, name)!r}: goes with seas, and records stand in their place"
                 )
         for record in self.records:
-            if not isinstance(record, RecordedMotion):
-                raise InvalidValue(f"records: {record!r} is not a RecordedMotion")
+            require_instance("records", record, RecordedMotion)
             if record.duration < self.window:
                 name = "a record" if record.path is None else str(record.path)
                 raise InvalidValue(

@@ -49,8 +49,9 @@ from aframe_env.scenario.scenario import Scenario
 from aframe_env.scenario.sea import Sea, SeaMotion
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.scenario.vessel import Vessel
-from aframe_env.serialization import plain, read_toml, strict_converter, structure
-from aframe_env.validation import InvalidValue, require_choice
+from aframe_env.serialization import plain, strict_converter, structure
+from aframe_env.text import read_toml
+from aframe_env.validation import InvalidValue, require_choice, shown
 
 _SECTIONS: Mapping[str, type[Section]] = {
     "box": RectangularHollow,
@@ -125,7 +126,7 @@ def scenario_source(given: ScenarioSource | str | Path | Mapping[str, Any] | Non
         return read_scenarios(given)
     if isinstance(given, Mapping):
         return scenarios_of(plain(given), Path(), "scenario")
-    raise InvalidValue(f"scenario = {given!r}: must be a Scenario, a ScenarioDistribution, a file or a mapping")
+    raise InvalidValue(f"scenario = {shown(given)}: must be a Scenario, a ScenarioDistribution, a file or a mapping")
 
 
 def scenario_text(source: ScenarioSource) -> str:
@@ -200,7 +201,7 @@ def _converter(folder: Path) -> Converter:
 def _kind(value: Any, kinds: tuple[str, ...]) -> tuple[str, dict[str, Any]]:
     """The kind that a table names, and the rest of the table."""
     if not isinstance(value, dict):
-        raise InvalidValue(f"{value!r}: must be a table with a kind, one of {', '.join(kinds)}")
+        raise InvalidValue(f"{shown(value)}: must be a table with a kind, one of {', '.join(kinds)}")
     if "kind" not in value:
         raise InvalidValue(f"key 'kind' is missing: must be one of {', '.join(map(repr, kinds))}")
     require_choice("kind", value["kind"], kinds)

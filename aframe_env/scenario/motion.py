@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from typing_extensions import TypeIs
 
-from aframe_env.validation import InvalidValue, require_choice, require_number
+from aframe_env.validation import InvalidValue, require_choice, require_instance, require_number
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -135,9 +135,9 @@ class HarmonicMotion:
     harmonics: tuple[Harmonic, ...] = ()
 
     def __post_init__(self) -> None:
+        require_instance("harmonics", self.harmonics, tuple)
         for item in self.harmonics:
-            if not isinstance(item, Harmonic):
-                raise InvalidValue(f"harmonics: {item!r} is not a Harmonic")
+            require_instance("harmonics", item, Harmonic)
 
     @classmethod
     def paper(cls) -> HarmonicMotion:

@@ -19,6 +19,7 @@ import numpy.typing as npt
 import scipy
 
 from aframe_env.scenario.motion import COORDINATES, FloatArray
+from aframe_env.text import read_csv
 from aframe_env.validation import InvalidValue, require_number
 
 _LENGTHS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
@@ -180,19 +181,12 @@ def _check(times: FloatArray, coordinates: FloatArray, places: list[str], source
 
 def _read(path: Path) -> tuple[FloatArray, FloatArray, list[int]]:
     """Times (T,) s, coordinates (T, 6) in m and rad, and the lines they stand on."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InvalidValue(f"{path}: cannot be read: {error.strerror or error}") from error
-    except UnicodeDecodeError as error:
-        raise InvalidValue(f"{path}: must be a text file in UTF-8: {error}") from error
     columns: list[tuple[int, float]] | None = None
     rows: list[list[float]] = []
     lines: list[int] = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        if not line.strip() or line.lstrip().startswith("#"):
+    for number, cells in read_csv(path, "record"):
+        if cells[0].startswith("#"):
             continue
-        cells = [cell.strip() for cell in line.split(",")]
         if columns is None:
             columns = _header(cells, f"{path}, line {number}")
             continue

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.scenario.motion import HarmonicMotion, ShipMotion, has_components, is_tabled
-from aframe_env.validation import InvalidValue, require_choice, require_number
+from aframe_env.validation import InvalidValue, require_choice, require_instance, require_number, shown
 
 Initial = Literal["comoving", "rest"]
 INITIALS: tuple[str, ...] = ("comoving", "rest")
@@ -35,10 +35,9 @@ class Scenario:
     """g, m/s²."""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.crane, Crane):
-            raise InvalidValue(f"crane = {self.crane!r}: must be a Crane")
+        require_instance("crane", self.crane, Crane)
         if not (has_components(self.motion) or is_tabled(self.motion)):
-            raise InvalidValue(f"motion = {self.motion!r}: must be a ship motion (HarmonicMotion, SeaMotion, ...)")
+            raise InvalidValue(f"motion = {shown(self.motion)}: must be a ship motion (HarmonicMotion, SeaMotion, ...)")
         require_number("load_mass", self.load_mass, "kg", low=0.0, high=1e7, low_open=True)
         require_number("target_level", self.target_level, "m")
         require_number("rope_damping", self.rope_damping, "N s/m", low=0.0, high=1e8)

@@ -21,7 +21,7 @@ from aframe_env.dynamics.compiling import kernel
 from aframe_env.dynamics.wave_components import draw_wave, respond, response_cell
 from aframe_env.scenario.motion import ComplexArray, Components, FloatArray
 from aframe_env.scenario.vessel import Vessel
-from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
+from aframe_env.validation import require_choice, require_instance, require_integer, require_number
 
 SPECTRA: tuple[str, ...] = ("jonswap", "pierson-moskowitz")
 
@@ -137,10 +137,8 @@ class SeaMotion:
     vessel: Vessel = field(default_factory=Vessel.supply)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.sea, Sea):
-            raise InvalidValue(f"sea = {self.sea!r}: must be a Sea")
-        if not isinstance(self.vessel, Vessel):
-            raise InvalidValue(f"vessel = {self.vessel!r}: must be a Vessel")
+        require_instance("sea", self.sea, Sea)
+        require_instance("vessel", self.vessel, Vessel)
 
     def components(self) -> Components:
         """Return the deck's response to each wave."""

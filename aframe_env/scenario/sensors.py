@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from aframe_env.dynamics.compiling import kernel
 from aframe_env.dynamics.random import normal
-from aframe_env.validation import InvalidValue, require_number
+from aframe_env.validation import InvalidValue, require_instance, require_number, shown
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -71,10 +71,9 @@ class Sensors:
     def __post_init__(self) -> None:
         require_number("delay", self.delay, "s", low=0.0, high=10.0)
         if not isinstance(self.mass_told, bool):
-            raise InvalidValue(f"mass_told = {self.mass_told!r}: must be True or False")
+            raise InvalidValue(f"mass_told = {shown(self.mass_told)}: must be True or False")
         for name in CHANNELS:
-            if not isinstance(getattr(self, name), Channel):
-                raise InvalidValue(f"{name} = {getattr(self, name)!r}: must be a Channel")
+            require_instance(name, getattr(self, name), Channel)
 
     @classmethod
     def ideal(cls) -> Sensors:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from aframe_env.text import read_csv
 from aframe_env.validation import InvalidValue, require_vector
 
 FloatArray = npt.NDArray[np.float64]
@@ -70,17 +70,13 @@ class Vessel:
         image) or to 360°, at steps of 45° at the most.
         """
         path = Path(path)
-        try:
-            lines = path.read_text(encoding="utf-8").splitlines()
-        except (OSError, UnicodeDecodeError) as error:
-            raise InvalidValue(f"vessel {str(path)!r}: cannot be read: {error}") from error
         name, reference = path.stem, (0.0, 0.0, 0.0)
         rows: list[list[float]] = []
         header_seen = False
-        for number, line in enumerate(lines, start=1):
+        for number, cells in read_csv(path, "vessel"):
             where = f"{path}, line {number}"
-            if line.startswith("#"):
-                key, _, value = line[1:].partition(":")
+            if cells[0].startswith("#"):
+                key, _, value = cells[0][1:].partition(":")
                 if key.strip() == "title":
                     name = value.strip()
                 elif key.strip() == "reference_point_m":
@@ -88,13 +84,11 @@ class Vessel:
                     if len(point) != 3:
                         raise InvalidValue(f"{where}: reference_point_m: must be three numbers in m")
                     reference = (point[0], point[1], point[2])
-            elif line.strip():
-                cells = next(csv.reader([line]))
-                if not header_seen:
-                    if tuple(cell.strip() for cell in cells) != COLUMNS:
-                        raise InvalidValue(f"{where}: the columns must be {','.join(COLUMNS)}")
-                    header_seen = True
-                    continue
+            elif not header_seen:
+                if tuple(cells) != COLUMNS:
+                    raise InvalidValue(f"{where}: the columns must be {','.join(COLUMNS)}")
+                header_seen = True
+            else:
                 if len(cells) != len(COLUMNS):
                     raise InvalidValue(f"{where}: {len(cells)} columns: must be {len(COLUMNS)}")
                 row = [_number(cell, where, column) for cell, column in zip(cells, COLUMNS, strict=True)]

@@ -210,11 +210,10 @@ def load(place: str | Path = shipped.DRIVE_MAP) -> DriveMap:
     """Load a map from its folder, or the shipped one. Raises InvalidValue where the files do not belong together."""
     path = shipped.folder(place)
     try:
-        text, data = (path / CARD).read_bytes(), (path / ARRAYS).read_bytes()
-    except OSError as error:
+        data = (path / ARRAYS).read_bytes()
+    except (OSError, ValueError) as error:
         raise InvalidValue(f"no drive map in {str(path)!r}: {error}") from error
-    source = str(path / CARD)
-    card = structure(strict_converter(), cards.unsealed(text, source, FORMAT), MapCard, source)
+    card = structure(strict_converter(), cards.read(path / CARD, "drive map", FORMAT), MapCard, str(path / CARD))
     if hashlib.sha256(data).hexdigest() != card.sha256:
         raise InvalidValue(f"{path / ARRAYS}: does not match the sha256 in {CARD}: damaged or not its file")
     try:

@@ -140,12 +140,10 @@ def load(agent: str | Path) -> LearnedPolicy:
     if not (path / CARD).is_file() and seeds(path):
         path = seeds(path)[0]
     try:
-        text = (path / CARD).read_bytes()
         weights = (path / WEIGHTS).read_bytes()
     except OSError as error:
         raise InvalidValue(f"no agent in {str(path)!r}: {error}") from error
-    source = str(path / CARD)
-    card = structure(strict_converter(), cards.unsealed(text, source, FORMAT), AgentCard, source)
+    card = structure(strict_converter(), cards.read(path / CARD, "agent", FORMAT), AgentCard, str(path / CARD))
     if digest(weights) != card.sha256:
         raise InvalidValue(f"{path / WEIGHTS}: does not match the sha256 in {CARD}: damaged or not its file")
     actor = Actor(len(card.features), card.hidden, squashed=card.squashed)

@@ -15,7 +15,7 @@ from agents.learned.agent import CARD, WEIGHTS, AgentCard, card_text, digest, se
 from agents.learned.features import STATE_FEATURES
 from agents.learned.network import Actor
 from agents.policy import Knowledge
-from agents.registry import REGISTRY, BuildContext, choose, choose_all, slug
+from agents.registry import REGISTRY, BuildContext, FunctionPolicy, choose, choose_all, slug
 from agents.rollout import held_out_scenarios
 
 MAP = str(Path(__file__).parents[2] / "results" / "drive-map")
@@ -144,10 +144,59 @@ def test_anybodys_function_is_a_policy():
     np.testing.assert_array_equal(policy.act(np.ones((2, 14), dtype=np.float32), 3.0), [3.0, 3.0])
 
 
-@pytest.mark.parametrize("text", ["absent", "json:absent", f"{__name__}:REGISTRY"])
-def test_what_is_no_policy_is_refused(text):
-    with pytest.raises(InvalidValue, match="policy = "):
+class NoPolicy:
+    name, knows = 3, "much"
+
+    def reset(self, scenarios, control_period): ...
+
+    def act(self, observation, time): ...
+
+
+class Unwilling:
+    def __init__(self):
+        raise RuntimeError("no weights")
+
+
+class Broken:
+    name, knows = "broken", Knowledge.STATE
+
+    def reset(self, scenarios, control_period): ...
+
+    def act(self, observation, time):
+        return observation[:, 1 / 0]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("absent", "must be one of"),
+        ("json:absent", "cannot be imported: AttributeError: .* has no attribute 'absent'$"),
+        ("no_such_module:policy", "cannot be imported: ModuleNotFoundError: No module named 'no_such_module'$"),
+        (f"{__name__}:REGISTRY", "is a dict, must be a policy or callable"),
+        (f"{__name__}:NoPolicy", "made a NoPolicy, must be a policy with name, knows, reset and act"),
+        ("unittest.mock:MagicMock", "made a MagicMock, must be a policy"),
+        (f"{__name__}:Unwilling", r"cannot be made: RuntimeError: no weights \(.*test_registry.py, line \d+\)$"),
+        ("sys:exit", "cannot be made: SystemExit"),
+    ],
+)
+def test_what_is_no_policy_is_refused(text, words):
+    with pytest.raises(InvalidValue, match=f"policy = {text!r}: .*{words}"):
         choose(text)
+
+
+def test_a_policy_that_raises_is_named_with_the_line():
+    policy = choose(f"{__name__}:Broken").build(context())
+    policy.reset(context().scenarios, 0.1)
+    with pytest.raises(InvalidValue, match=r"^broken: ZeroDivisionError: division by zero \(.*test_registry.py, line"):
+        policy.act(np.ones((2, 14), dtype=np.float32), 0.0)
+
+
+@pytest.mark.parametrize("said", ["fast", [10**400, 0.0], [[1.0], [2.0], [3.0]], None])
+def test_a_function_that_gives_no_speeds_is_refused(said):
+    policy = FunctionPolicy("odd", lambda observation: said, Knowledge.STATE, takes_time=False)
+    policy.reset(context().scenarios, 0.1)
+    with pytest.raises(InvalidValue, match=r"odd.*must be .*\(2,\)"):
+        policy.act(np.ones((2, 14), dtype=np.float32), 0.0)
 
 
 def test_a_folder_without_an_agent_is_refused(tmp_path):

@@ -175,7 +175,7 @@ def test_an_environment_takes_files_and_mappings(tmp_path):
         ('kind = "distribution"\nwindow = 30.0', r"mine.toml: window = 30 s: goes with records, and there are none"),
         ('kind = "distribution"\nwaves = 1', r"unknown key 'waves': must be one of"),
         ('kind = "distribution"\ngamma = "broad"', r"gamma = 'broad': must be 'dnv', a number or"),
-        ('kind = "distribution"\nrecords = ["absent.csv"]', r"absent.csv: cannot be read"),
+        ('kind = "distribution"\nrecords = ["absent.csv"]', r"absent.csv': cannot be read"),
         ('kind = "distribution"\nvessel = "absent.csv"', r"mine.toml: .*absent.csv"),
         ('kind = "distribution"\n[sensors]\ndelay = -1.0', r"delay = -1.0 s: must be in \[0, 10\] s"),
         ('kind = "distribution"\n[sensors.wind]\nnoise = 1.0', r"unknown key 'wind'"),
@@ -192,7 +192,7 @@ def test_bad_files_are_one_clear_line(text, words, tmp_path):
 def test_bad_records():
     with pytest.raises(InvalidValue, match=r"window = 60 s: must be in \(0, 50\] s, the length of a record"):
         ScenarioDistribution(records=(record(50.0),))
-    with pytest.raises(InvalidValue, match=r"records: 'x\.csv' is not a RecordedMotion"):
+    with pytest.raises(InvalidValue, match=r"records = 'x\.csv': must be a RecordedMotion"):
         ScenarioDistribution(records=("x.csv",))
     with pytest.raises(InvalidValue, match=r"start = 1.0 s: must be in \[0, 0\] s"):
         RecordedWindow(record=record(50.0), start=1.0, duration=50.0)

@@ -120,7 +120,7 @@ def test_what_no_file_holds_can_not_be_written():
         ("[motion]\nkind = 'sea'\n[motion.sea]\nhs = 2", "[motion.sea.tp] key 'tp' is missing"),
         ("[motion]\nkind = 'sea'\nship = 'a'\n[motion.sea]\nhs = 2\ntp = 8", "unknown key 'ship'"),
         ("[motion]\nkind = 'sea'\n[motion.sea]\nhs = 2\ntp = 8\nspectrum = 'x'", "spectrum = 'x': must be one of"),
-        ("[motion]\nkind = 'recorded'\nfile = 'n.csv'", "n.csv: cannot be read"),
+        ("[motion]\nkind = 'recorded'\nfile = 'n.csv'", "n.csv': cannot be read"),
         ("[motion]\nkind = 'recorded'", "[motion.file] key 'file' is missing"),
         ("a =", "not TOML"),
     ],

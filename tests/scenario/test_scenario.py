@@ -147,7 +147,7 @@ def test_scenario_option_is_the_episode() -> None:
         (lambda: Harmonic(coordinate="bob", amplitude=1.0, period=5.0), "coordinate = 'bob': must be one of 'surge'"),
         (lambda: Harmonic(coordinate="roll", amplitude=9.0, period=5.0), "amplitude = 9.0 rad"),
         (lambda: Harmonic(coordinate="heave", amplitude=1.0, period=0.0), "period = 0.0 s"),
-        (lambda: HarmonicMotion(harmonics=(1.0,)), "harmonics: 1.0 is not a Harmonic"),
+        (lambda: HarmonicMotion(harmonics=(1.0,)), "harmonics = 1.0: must be a Harmonic"),
         (lambda: Rope(axial_stiffness=0.0), r"axial_stiffness = 0.0 N: must be in \(0, inf\) N"),
         (lambda: Rope(breaking_load=-1.0), "breaking_load = -1.0 N"),
         (lambda: Winch(drum_diameter=0.0), "drum_diameter = 0.0 m"),

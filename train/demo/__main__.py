@@ -22,6 +22,7 @@ from rich.progress import track
 from aframe_env.validation import InvalidValue, require_integer
 from train.evaluate.one_episode import EpisodeOptions, begin
 from train.shared.cli import parse
+from train.shared.console import PlainConsole
 from train.shared.run_folder import new_file, user_errors
 
 RECORDINGS: Final = (".html", ".viser")
@@ -90,7 +91,7 @@ def _serve(options: Options, console: Console) -> int:
 def main() -> int:
     """Run the command."""
     with user_errors():
-        return run(parse(Options, "train.demo", __doc__ or ""), Console())
+        return run(parse(Options, "train.demo", __doc__ or ""), PlainConsole())
 
 
 if __name__ == "__main__":

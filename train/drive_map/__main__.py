@@ -29,6 +29,7 @@ from train.drive_map.figures import draw
 from train.drive_map.notes import notes
 from train.drive_map.seas import compare_in
 from train.shared.cli import parse
+from train.shared.console import PlainConsole
 from train.shared.job_store import JobStore, version_of
 from train.shared.jobs import run_jobs
 from train.shared.run_folder import (
@@ -143,7 +144,7 @@ def run(options: Options, console: Console) -> int:
     text = notes(command, drive_map, crane, found, held_out, seas, fresh, rate)
     write_text(folder / "notes.md", text)
     opened.finish()
-    console.print(text, soft_wrap=True, markup=False)
+    console.print(text, soft_wrap=True)
     console.print(f"written: {folder}")
     return 0
 
@@ -151,7 +152,7 @@ def run(options: Options, console: Console) -> int:
 def main() -> int:
     """Run the command."""
     with user_errors():
-        return run(parse(Options, "train.drive_map", __doc__ or ""), Console())
+        return run(parse(Options, "train.drive_map", __doc__ or ""), PlainConsole())
 
 
 if __name__ == "__main__":

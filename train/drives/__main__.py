@@ -20,11 +20,12 @@ from train.drives.figures import draw
 from train.drives.notes import notes
 from train.drives.results import HEADINGS, write_results
 from train.shared.cli import parse
+from train.shared.console import PlainConsole
 from train.shared.run_folder import open_run, user_errors, write_text
 
 
 def run(options: Options, console: Console) -> int:
-    """Optimise, print, write; return the exit status."""
+    """Optimise, write, print; return the exit status."""
     scenario = paper_case() if options.scenario is None else read_scenario(options.scenario)
     opened = open_run(options, "train.drives")
     folder, command = opened.folder, opened.command
@@ -50,18 +51,18 @@ def run(options: Options, console: Console) -> int:
         except KeyboardInterrupt:
             console.print("interrupted: nothing was written")
             return 130
-    table = Table(title=f"Optimised drives over {options.duration:g} s", box=SIMPLE, padding=0)
-    for heading in HEADINGS:
-        table.add_column(heading, justify="left" if heading == "drive" else "right", no_wrap=True)
-    for result in experiment.results:
-        table.add_row(*result.row.cells)
-    console.print(table)
     write_results(folder, experiment, options.free_start)
     winch = scenario.crane.winch
     draw(folder, scenario.target_level, winch.drum_radius, experiment)
     write_text(folder / "notes.md", notes(command, winch, experiment, others, PAPER_DAMPING_RATIO))
     opened.record(options, seed=options.seed)
     write_text(folder / "scenario.toml", scenario_text(scenario))
+    table = Table(title=f"Optimised drives over {options.duration:g} s", box=SIMPLE, padding=0)
+    for heading in HEADINGS:
+        table.add_column(heading, justify="left" if heading == "drive" else "right", no_wrap=True)
+    for result in experiment.results:
+        table.add_row(*result.row.cells)
+    console.print(table)
     console.print(f"written: {folder} (notes.md says what was assumed)")
     return 0
 
@@ -69,7 +70,7 @@ def run(options: Options, console: Console) -> int:
 def main() -> int:
     """Run the command."""
     with user_errors():
-        return run(parse(Options, "train.drives", __doc__ or ""), Console())
+        return run(parse(Options, "train.drives", __doc__ or ""), PlainConsole())
 
 
 if __name__ == "__main__":

@@ -12,12 +12,11 @@ import sys
 from dataclasses import dataclass
 from importlib.util import find_spec
 
-from rich.console import Console
-
 from aframe_env.validation import InvalidValue
 from agents.registry import choose_all
 from train.evaluate.run import AFTER_TRAINING, HeldOut, require_period, run_all, write
 from train.shared.cli import parse
+from train.shared.console import PlainConsole
 from train.shared.run_folder import RunOptions, open_jobs, user_errors
 
 REPORT_PACKAGES = ("jinja2", "plotly", "pyarrow")
@@ -63,7 +62,7 @@ class Options(RunOptions, HeldOut):
 def main() -> int:
     """Run the command."""
     with user_errors():
-        options, console = parse(Options, "train.evaluate", __doc__ or ""), Console()
+        options, console = parse(Options, "train.evaluate", __doc__ or ""), PlainConsole()
         choices = choose_all(options.policies)
         require_period(choices, options.control_period)
         opened = open_jobs(options, "train.evaluate", "comparison.json")
@@ -82,7 +81,7 @@ def main() -> int:
                     write_report(folder / "report.html", comparison, opened.command)
                 console.print(f"report: {folder / 'report.html'}")
             elif needed := needed_for_the_report():
-                console.print(f"no report: it {needed}", markup=False)
+                console.print(f"no report: it {needed}")
         except KeyboardInterrupt:
             console.print("interrupted: what is finished is kept; the same command goes on from there")
             return 130

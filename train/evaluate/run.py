@@ -157,7 +157,11 @@ def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console, *,
         JobStore(jobs, _Ran, version) as ran,
         JobStore(jobs, OptimisedDrive, version) as drives,
         Progress(
-            TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), console=console
+            TextColumn("{task.description}", markup=False),  # the name of somebody's policy
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+            console=console,
         ) as progress,
     ):
         for spec in (DRUM_STILL, *(c for c in specs if c.name != DRUM_STILL.name)):
@@ -210,10 +214,10 @@ def observation_of(policy: Policy, config: TaskConfig) -> task.Observation:
 
 
 def write(folder: Path, comparison: Comparison, console: Console) -> None:
-    """Write figures, table and picture of a comparison into a folder, and print the table."""
-    console.print(rich_table(comparison.families))
+    """Write figures, table and picture of a comparison into a folder, then print the table."""
     write_comparison(folder, comparison.families, comparison.rows, comparison.entries)
     comparison_figure(folder / "comparison.png", comparison.entries, comparison.still, comparison.families)
+    console.print(rich_table(comparison.families))
     console.print(f"comparison: {folder / 'comparison.md'}, {folder / 'comparison.png'}")
 
 

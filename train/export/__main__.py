@@ -25,6 +25,7 @@ from train.export.check import check
 from train.export.episode import write_episode
 from train.export.model import export
 from train.shared.cli import parse
+from train.shared.console import PlainConsole
 from train.shared.run_folder import new_folder, user_errors, write_atomically, write_json
 
 MODEL = "controller.onnx"
@@ -72,7 +73,7 @@ def run(options: Options, console: Console) -> int:
     write_json(folder / DESCRIPTION, description)
     scenarios: list[Scenario] = held_out_scenarios(ScenarioDistribution(), max(1, options.check))
     write_episode(folder / EPISODE, agent, folder / MODEL, scenarios[0])
-    console.print(f"controller: {folder / MODEL}", markup=False)
+    console.print(f"controller: {folder / MODEL}")
     if options.check:
         with console.status(f"checking on {options.check} held-out scenarios"):
             agreement = check(agent, folder / MODEL, scenarios)
@@ -93,7 +94,7 @@ def run(options: Options, console: Console) -> int:
 def main() -> int:
     """Run the command."""
     with user_errors():
-        return run(parse(Options, "train.export", __doc__ or ""), Console())
+        return run(parse(Options, "train.export", __doc__ or ""), PlainConsole())
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -14,6 +13,7 @@ import numpy as np
 from gymnasium.error import DependencyNotInstalled
 from stable_baselines3.common.logger import CSVOutputFormat, KVWriter, Logger, configure
 
+from aframe_env.text import read_csv
 from aframe_env.validation import InvalidValue
 
 LOGS: Final = ("tensorboard", "wandb", "mlflow")
@@ -81,9 +81,14 @@ def _figures_until(timesteps: int, path: Path) -> list[dict[str, str]]:
     """Lines of the CSV file of figures up to so many control steps."""
     if not timesteps or not path.exists():
         return []
-    with path.open(encoding="utf-8", newline="") as file:
-        lines = [line for line in csv.DictReader(file) if line.get("time/total_timesteps")]
-    return [line for line in lines if int(line["time/total_timesteps"]) <= timesteps]
+    rows = [cells for _, cells in read_csv(path, "log")]
+    lines = [dict(zip(rows[0], cells, strict=False)) for cells in rows[1:]]  # the last may have been cut off
+    return [line for line in lines if 0 < _whole(line.get("time/total_timesteps")) <= timesteps]
+
+
+def _whole(cell: str | None) -> int:
+    """Number of control steps that a cell says; 0 if none."""
+    return int(cell) if cell is not None and cell.isdecimal() else 0
 
 
 def _write_again(lines: Sequence[Mapping[str, str]], logger: Logger) -> None:

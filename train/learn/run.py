@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 
+from aframe_env.text import read_json
 from aframe_env.validation import InvalidValue
 from agents.learned.agent import WEIGHTS, load
 from train.evaluate.run import evaluate
@@ -24,6 +24,7 @@ from train.learn.registry import find_learner
 from train.learn.selection import KeepBest
 from train.learn.trained import best_policy, save
 from train.shared.cli import parse, read_options, to_mapping
+from train.shared.console import PlainConsole
 from train.shared.run_folder import (
     CONFIG,
     Run,
@@ -78,7 +79,7 @@ def main(name: str) -> int:
         if successor is not None:
             spec = find_learner(successor)
             options = _options(spec)
-        return train(spec, options, Console())
+        return train(spec, options, PlainConsole())
 
 
 def _options(spec: LearnerSpec) -> LearningOptions:
@@ -121,7 +122,12 @@ def _finished(options: LearningOptions) -> bool:
 def _learned(folder: Path) -> bool:
     """Whether the training in a folder came to its end."""
     metrics = folder / METRICS
-    return metrics.exists() and not json.loads(metrics.read_text(encoding="utf-8"))["interrupted"]
+    if not metrics.exists():
+        return False
+    data = read_json(metrics, "metrics")
+    if not isinstance(data, dict) or not isinstance(data.get("interrupted"), bool):
+        raise InvalidValue(f"{metrics}: must be the figures of a training; pass --overwrite to do it again")
+    return not data["interrupted"]
 
 
 def _train_one(spec: LearnerSpec, options: LearningOptions, console: Console) -> int:

@@ -20,13 +20,15 @@ from rich.console import Console
 from rich.progress import Progress
 
 from aframe_env.scenario import Scenario, ScenarioSource
+from aframe_env.text import read_toml
 from aframe_env.validation import InvalidValue, require_choice, require_integer
 from agents.policy import DrumStill
 from agents.rollout import HELD_OUT_SEED, drawn_scenarios, run
 from train.learn.learner import Search
 from train.learn.registry import LEARNERS, find_learner
 from train.learn.trained import to_policy
-from train.shared.cli import parse, to_toml
+from train.shared.cli import parse, to_mapping, to_toml
+from train.shared.console import PlainConsole
 from train.shared.markdown import table
 from train.shared.run_folder import command_line, user_errors, versions, write_json, write_text
 from train.shared.scenarios import ScenarioOptions
@@ -159,12 +161,12 @@ def search(options: Options, console: Console) -> optuna.Study:
 def main() -> int:
     """Run the command."""
     with user_errors():
-        options, console = parse(Options, "train.tune", __doc__ or ""), Console()
+        options, console = parse(Options, "train.tune", __doc__ or ""), PlainConsole()
         config = options.out / "config.toml"
         same = replace(options, trials=1)
         if config.exists() and not (options.out / "journal.log").exists():
             raise InvalidValue(f"out = {str(options.out)!r}: holds something else than a search; choose another")
-        if config.exists() and config.read_text(encoding="utf-8") != to_toml(same):
+        if config.exists() and read_toml(config, "config") != to_mapping(same):
             raise InvalidValue(f"out = {str(options.out)!r}: a search with other options; see its config.toml")
         options.out.mkdir(parents=True, exist_ok=True)
         write_text(config, to_toml(same))

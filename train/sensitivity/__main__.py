@@ -9,7 +9,6 @@ from __future__ import annotations
 import sys
 from dataclasses import asdict
 
-from rich.console import Console
 from rich.progress import Progress
 
 import aframe_env
@@ -21,6 +20,7 @@ from train.sensitivity.figures import draw_curves, draw_indices
 from train.sensitivity.notes import notes
 from train.sensitivity.study import MAP, Job, Options, assumed_scenarios, identity, still_rms, study
 from train.shared.cli import parse
+from train.shared.console import PlainConsole
 from train.shared.job_store import JobStore, version_of
 from train.shared.jobs import run_jobs
 from train.shared.run_folder import open_jobs, user_errors, write_json, write_text
@@ -30,7 +30,7 @@ from train.shared.tuned_drives import tune
 def main() -> int:
     """Run the command."""
     with user_errors():
-        options, console = parse(Options, "train.sensitivity", __doc__ or ""), Console()
+        options, console = parse(Options, "train.sensitivity", __doc__ or ""), PlainConsole()
         if MAP in options.policies:
             drive_map.load(options.drive_map)
         opened = open_jobs(options, "train.sensitivity", "notes.md", seed=options.seed)
@@ -69,7 +69,7 @@ def main() -> int:
         text = notes(opened.command, options.number, studies)
         write_text(folder / "notes.md", text)
         opened.finish()
-        console.print(text, soft_wrap=True, markup=False)
+        console.print(text, soft_wrap=True)
         console.print(f"written: {folder}")
     return 0
 

@@ -11,7 +11,8 @@ import tomli_w
 import tyro
 from cattrs import Converter
 
-from aframe_env.serialization import plain, read_toml, strict_converter, structure
+from aframe_env.serialization import plain, strict_converter, structure
+from aframe_env.text import read_toml
 from aframe_env.validation import InvalidValue
 
 T = TypeVar("T")
@@ -35,12 +36,20 @@ def to_toml(options: Any) -> str:
 
 def _converter() -> Converter:
     converter = strict_converter()
-    converter.register_structure_hook(Path, lambda value, _: Path(value))
+    converter.register_structure_hook(Path, lambda value, _: Path(converter.structure(value, str)))
     converter.register_structure_hook(
         int | Path, lambda value, _: Path(value) if isinstance(value, str) else converter.structure(value, int)
     )
     converter.register_unstructure_hook(Path, str)
     return converter
+
+
+def _require_text(arg: str) -> None:
+    """Raise where the bytes of an argument are no text: a run could not say how it was made."""
+    try:
+        arg.encode()
+    except UnicodeEncodeError as error:
+        raise InvalidValue(f"argument {arg!r}: must be text in UTF-8") from error
 
 
 def program(command: str) -> str:
@@ -54,6 +63,8 @@ def parse(kind: type[T], command: str, description: str, args: Sequence[str] | N
     ``command`` is the command's name, as in "train.drives".
     """
     args = list(sys.argv[1:] if args is None else args)
+    for arg in args:
+        _require_text(arg)
     default: T | None = None
     for index, arg in enumerate(args):
         name, _, value = arg.partition("=")

@@ -10,7 +10,6 @@ import platform
 import shlex
 import sys
 import tempfile
-import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import datetime
@@ -21,8 +20,10 @@ from typing import Any, Final
 from gymnasium.error import DependencyNotInstalled
 from llvmlite.binding import get_host_cpu_name
 
+from aframe_env.text import read_toml
 from aframe_env.validation import InvalidValue
 from train.shared.cli import program, to_mapping, to_toml
+from train.shared.console import let_output_degrade
 from train.shared.job_store import JOBS
 from train.shared.jobs import JobsFailed
 
@@ -167,8 +168,8 @@ def open_run(options: RunOptions, name: str, *, goes_on: bool = False) -> Run:
 def _recorded(folder: Path) -> dict[str, Any] | None:
     """Options that count of the run that began to fill a folder; None if there was none."""
     try:
-        return _what_counts(tomllib.loads((folder / CONFIG).read_text(encoding="utf-8")))
-    except (OSError, ValueError):
+        return _what_counts(read_toml(folder / CONFIG, "config"))
+    except InvalidValue:
         return None
 
 
@@ -199,7 +200,11 @@ def _lock(folder: Path) -> None:
 
 @contextlib.contextmanager
 def user_errors() -> Iterator[None]:
-    """One line on standard error for bad input, a failing disk or job, a missing extra (status 2) and Ctrl-C (130)."""
+    """One line on standard error for bad input, a failing disk or job, a missing extra (status 2) and Ctrl-C (130).
+
+    Every command runs within it; its output degrades on a console that has not all characters.
+    """
+    let_output_degrade()
     try:
         yield
     except KeyboardInterrupt:

@@ -30,7 +30,7 @@ import numpy as np
 import scipy
 import tyro
 
-from aframe_env.serialization import read_toml
+from aframe_env.text import read_toml
 from aframe_env.validation import InvalidValue
 from train.shared.cli import parse
 from train.shared.run_folder import RunOptions, new_file, open_run, user_errors, write_json, write_text

@@ -21,7 +21,7 @@ from aframe_env.scenario import Scenario
 from aframe_env.scenario.crane import Crane, Frame
 from aframe_env.scenario.cross_sections import Servomotor
 from aframe_env.scenario.file import scenario_of
-from aframe_env.validation import InvalidValue, require_choice, require_number
+from aframe_env.validation import InvalidValue, require_choice, require_number, shown
 
 FORMAT = """\
 Files are TOML, SI units. Keys of every kind of file (all optional):
@@ -91,7 +91,7 @@ def _only(data: Mapping[str, Any], allowed: set[str], where: str = "") -> None:
 def _flag(data: Mapping[str, Any], name: str, default: bool) -> bool:
     value = data.get(name, default)
     if not isinstance(value, bool):
-        raise InvalidValue(f"{name} = {value!r}: must be true or false")
+        raise InvalidValue(f"{name} = {shown(value)}: must be true or false")
     return value
 
 
@@ -104,7 +104,7 @@ def _number(data: Mapping[str, Any], name: str, default: float, unit: str, low: 
 def _table(data: Mapping[str, Any], name: str) -> dict[str, Any]:
     value = data.get(name, {})
     if not isinstance(value, dict):
-        raise InvalidValue(f"{name} = {value!r}: must be a table, [{name}]")
+        raise InvalidValue(f"{name} = {shown(value)}: must be a table, [{name}]")
     return value
 
 
@@ -134,7 +134,7 @@ def model_of(data: Mapping[str, Any], crane: Crane, default: tuple[int, int]) ->
     """Frame model with the file's division."""
     rfes = data.get("rfes", list(default))
     if not isinstance(rfes, list) or len(rfes) != 2:
-        raise InvalidValue(f"rfes = {rfes!r}: must be two integers, [elements of a leg, elements of the beam]")
+        raise InvalidValue(f"rfes = {shown(rfes)}: must be two integers, [elements of a leg, elements of the beam]")
     layout = data.get("layout", "one_chain")
     return frame_model(
         crane.frame,
