@@ -34,6 +34,10 @@ MIN_SAMPLES: Final = 12
 """Fewest samples of a record: twice what one quintic piece of the spline rests on."""
 GAP: Final = 1.5
 """A time step longer than this many medians is a gap."""
+ROUNDING: Final = 1e-9
+"""What a time may lie beyond the end, s."""
+MAX_LINES: Final = 20_000_000
+"""Most lines of a motion's table: three weeks at 10 Hz, some 2.7 GiB."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,7 +104,7 @@ class RecordedMotion:
         """
         t = np.atleast_1d(np.asarray(times, dtype=np.float64))
         for extreme in (t.min(), t.max()) if t.size else ():
-            require_number("time", float(extreme), "s", low=0.0, high=self.duration)
+            require_number("time", float(extreme), "s", low=0.0, high=self.duration + ROUNDING)
         spline: scipy.interpolate.BSpline = self._spline  # type: ignore[attr-defined]
         return np.stack([spline(t), spline(t, nu=1), spline(t, nu=2)])
 
@@ -124,8 +128,9 @@ class RecordedWindow:
 
     def __post_init__(self) -> None:
         longest = self.record.duration
-        require_number("duration", self.duration, "s", low=0.0, high=longest, low_open=True)
-        require_number("start", self.start, "s", low=0.0, high=longest - self.duration)
+        require_number("start", self.start, "s", low=0.0, high=longest)
+        left = longest - self.start
+        require_number("duration", self.duration, "s", low=0.0, high=left + ROUNDING, low_open=True)
 
     @property
     def origin(self) -> str:
@@ -144,6 +149,12 @@ class RecordedWindow:
 def grid(duration: float, period: float) -> FloatArray:
     """Times 0, ``period``, ... up to ``duration`` (T,) s."""
     require_number("period", period, "s", low=0.0, high=1e6, low_open=True)
+    if duration / period >= MAX_LINES:
+        raise InvalidValue(
+            f"{duration:g} s of recorded motion at steps of {period:g} s take {duration / period * 18 * 8 / 2**30:.3g} "
+            f"GiB: must be at most {MAX_LINES * period:g} s; take a stretch with start and duration, or mend the unit "
+            "of time"
+        )
     # A duration that is a whole number of periods up to rounding has its last line too.
     count = math.floor(duration / period + 1e-6) + 1
     return np.asarray(np.minimum(np.arange(count) * period, duration))

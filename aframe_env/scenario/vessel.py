@@ -67,7 +67,7 @@ class Vessel:
         where the latter is missing). Then the columns ``omega_rad_s, heading_deg, surge_amp, surge_phase, ...,
         yaw_amp, yaw_phase``: amplitudes in m/m and rad/m, phases (lead) in rad, conventions as above. Every
         combination of frequency and heading must be there; headings from 0 to 180° (the rest is then the mirror
-        image) or to 360°, at steps of 45° at the most.
+        image) or all around, from wherever, at steps of 45° at the most.
         """
         path = Path(path)
         try:
@@ -152,8 +152,8 @@ def _number(text: str, where: str, name: str) -> float:
 def _check_row(row: list[float], where: str) -> None:
     if row[0] <= 0.0:
         raise InvalidValue(f"{where}: omega_rad_s = {row[0]:g} rad/s: must be above 0")
-    if not 0.0 <= row[1] <= 360.0:
-        raise InvalidValue(f"{where}: heading_deg = {row[1]:g}°: must be in [0, 360]")
+    if not -360.0 <= row[1] <= 360.0:
+        raise InvalidValue(f"{where}: heading_deg = {row[1]:g}°: must be in [-360, 360]")
     for column, value in zip(COLUMNS[2::2], row[2::2], strict=True):
         if value < 0.0:
             raise InvalidValue(f"{where}: {column} = {value:g}: must not be negative")
@@ -176,12 +176,41 @@ def _grid(rows: FloatArray, path: Path) -> tuple[FloatArray, FloatArray, Complex
         )
     ordered = rows[np.argsort(place)].reshape(len(frequencies), len(degrees), -1)
     response = ordered[:, :, 2::2] * np.exp(1j * ordered[:, :, 3::2])
-    if degrees[0] == 0.0 and degrees[-1] == 180.0:
-        degrees = np.concatenate([degrees, 360.0 - degrees[-2::-1]])
-        response = np.concatenate([response, response[:, -2::-1] * _MIRROR], axis=1)
-    elif degrees[0] == 0.0 and degrees[-1] < 360.0:
-        degrees = np.concatenate([degrees, [360.0]])
-        response = np.concatenate([response, response[:, :1]], axis=1)
-    if degrees[0] != 0.0 or degrees[-1] != 360.0 or np.diff(degrees).max() > 45.0:
-        raise InvalidValue(f"{path}: headings must go from 0 to 180° or around, at steps of 45° at the most")
+    degrees, response = _circle(degrees, response, path)
     return frequencies, np.radians(degrees), np.ascontiguousarray(response)
+
+
+def _circle(degrees: FloatArray, response: ComplexArray, path: Path) -> tuple[FloatArray, ComplexArray]:
+    """Headings [deg] from 0 to 360, and the response there, from those of a file in [-360, 360]."""
+    first, last = float(degrees[0]), float(degrees[-1])
+    around = degrees % 360.0
+    order = np.argsort(around, kind="stable")
+    around, response = around[order], response[:, order]
+    same = np.flatnonzero(np.diff(around) == 0.0)
+    for k in same:
+        apart = np.abs(response[:, k] - response[:, k + 1])
+        if (apart > 0.01 * np.abs(response).max(axis=(0, 1))).any():
+            raise InvalidValue(f"{path}: two responses at the one heading of {around[k]:g}°: must agree")
+    around, response = np.delete(around, same + 1), np.delete(response, same + 1, axis=1)
+    if last - first == 180.0 and first % 180.0 == 0.0:
+        # Half a circle from the bow to the stern, on either side.
+        mirrored = (-around) % 360.0
+        new = ~np.isin(mirrored, around)
+        around = np.concatenate([around, mirrored[new]])
+        order = np.argsort(around)
+        around, response = around[order], np.concatenate([response, response[:, new] * _MIRROR], axis=1)[:, order]
+    if around[0] > 0.0:
+        # Across the bow between the last heading and the first, as between any two.
+        share = around[0] / (around[0] + 360.0 - around[-1])
+        ahead = (1.0 - share) * response[:, :1] + share * response[:, -1:]
+        around, response = np.concatenate([[0.0], around]), np.concatenate([ahead, response], axis=1)
+        gap = around[1] + 360.0 - around[-1]
+    else:
+        gap = 360.0 - around[-1]
+    widest = max(gap, float(np.diff(around).max(initial=0.0)))
+    if widest > 45.0:
+        raise InvalidValue(
+            f"{path}: headings from {first:g} to {last:g}° leave {widest:g}° open: must go from 0 to 180°, or around, "
+            "at steps of 45° at the most"
+        )
+    return np.concatenate([around, [360.0]]), np.concatenate([response, response[:, :1]], axis=1)

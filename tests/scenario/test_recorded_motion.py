@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from aframe_env import InvalidValue, RecordedMotion, Scenario
+from aframe_env import InvalidValue, RecordedMotion, RecordedWindow, Scenario
 from aframe_env.env import AFrameHeaveEnv
 from aframe_env.scenario.motion import Components
 
@@ -173,3 +173,39 @@ def test_engine_follows_the_record_as_the_components(tmp_path):
             info = env.step(np.full(1, 0.3, dtype=np.float32))[4]
         ends.append(info["load_position"])
     assert np.abs(ends[0] - ends[1]).max() < 1e-6
+
+
+def test_a_window_may_end_with_the_record():
+    times = np.arange(0.0, 60.0, 0.1)
+    record = RecordedMotion(times=times, coordinates=np.zeros((600, 6)))
+    for start in np.random.default_rng(0).uniform(0.0, 59.0, 200):
+        window = RecordedWindow(record=record, start=start, duration=record.duration - start)
+        assert len(window.table(0.1)) == math.floor(window.duration / 0.1 + 1e-6) + 1
+
+
+def test_a_window_beyond_the_record_is_refused():
+    record = RecordedMotion(times=np.arange(600) * 0.1, coordinates=np.zeros((600, 6)))
+    with pytest.raises(InvalidValue, match=r"start = 65 s: must be in \[0, 59.9\] s"):
+        RecordedWindow(record=record, start=65, duration=1.0)
+    with pytest.raises(InvalidValue, match=r"duration = 30.0 s: must be in \(0, 19.9\] s"):
+        RecordedWindow(record=record, start=40.0, duration=30.0)
+
+
+def test_a_table_that_no_machine_holds_is_refused_with_its_size(tmp_path):
+    text = [HEADER, *(f"{k}e7,0,0,{k % 3},0,0,0" for k in range(20))]
+    scenario = Scenario(motion=RecordedMotion.from_csv(write(tmp_path / "m.csv", text)))
+    # 19e7 s at 0.1 s, 18 numbers of 8 bytes a line: 1.9e9 · 144 / 2**30.
+    with pytest.raises(InvalidValue, match=r"1.9e\+08 s of recorded motion at steps of 0.1 s take 255 GiB"):
+        AFrameHeaveEnv(scenario=scenario).reset(seed=0)
+
+
+def test_records_of_past_episodes_are_dropped():
+    env = AFrameHeaveEnv()
+    times = np.arange(601) * 0.1
+    coordinates = np.zeros((601, 6))
+    for k in range(60):
+        coordinates[:, 2] = np.sin(0.7 * times + k)
+        motion = RecordedMotion(times=times, coordinates=coordinates)
+        env.reset(seed=k, options={"scenario": Scenario(motion=motion)})
+        assert env.simulation.engine.deck()[0, 2] == pytest.approx(math.sin(k), abs=1e-9)
+    assert len(env.simulation.engine.records) <= 4 * 601

@@ -171,3 +171,69 @@ def test_repr_leaves_the_tables_out() -> None:
 def test_missing_vessel(tmp_path: Path) -> None:
     with pytest.raises(InvalidValue, match="cannot be read"):
         Vessel.from_csv(tmp_path / "none.csv")
+
+
+def _long_wave_text(headings: list[float], frequencies: tuple[float, ...] = (0.2, 0.3, 0.5)) -> str:
+    """Closed form of a table: a ship that goes with the wave's particles and slope."""
+    lines = [",".join(COLUMNS)]
+    for omega in frequencies:
+        k = omega**2 / 9.81
+        for degrees in headings:
+            c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+            response = np.array([-1j * c, -1j * s, 1.0, -1j * k * s, 1j * k * c, 1e-4j * k * s * c])
+            cells = np.stack([np.abs(response), np.angle(response)], axis=1).ravel()
+            lines.append(",".join(f"{value:.12g}" for value in (omega, degrees, *cells)))
+    return "\n".join(lines)
+
+
+AROUND = {
+    "from 15": list(range(15, 360, 30)),
+    "from 0": list(range(0, 360, 30)),
+    "0 to 360": list(range(0, 361, 30)),
+    "-180 to 180": list(range(-180, 181, 30)),
+    "-165 to 165": list(range(-165, 166, 30)),
+    "0 to 180": list(range(0, 181, 30)),
+    "-180 to 0": list(range(-180, 1, 30)),
+    "uneven": [-170, -140, -100, -60, -20, 20, 50, 90, 130, 150],
+}
+
+
+@pytest.mark.parametrize("name", AROUND)
+def test_headings_close_the_circle(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "ship.csv"
+    path.write_text(_long_wave_text(AROUND[name]))
+    vessel = Vessel.from_csv(path, deck_position=(0.0, 0.0, 0.0))
+    assert (vessel.headings[0], vessel.headings[-1]) == (0.0, 2.0 * math.pi)
+    assert (np.diff(vessel.headings) > 0.0).all()
+    for degrees in range(-180, 360, 5):
+        sea = Sea(hs=2.0, tp=2 * math.pi / 0.3, heading=math.radians(degrees), components=8)
+        waves = sea.waves()
+        surge, sway, heave = SeaMotion(sea=sea, vessel=vessel).components().response[:, :3].T
+        wave = waves.amplitude * np.exp(1j * waves.phase)
+        np.testing.assert_allclose(heave, wave, rtol=1e-9)
+        # The chord between two headings d apart runs within 1 - cos(d/2) of the circle: 0.061 for 40°.
+        np.testing.assert_allclose(surge / wave, 1j * math.cos(math.radians(degrees)), atol=0.061)
+        np.testing.assert_allclose(sway / wave, 1j * math.sin(math.radians(degrees)), atol=0.061)
+
+
+@pytest.mark.parametrize(
+    ("headings", "message"),
+    [
+        (list(range(0, 301, 30)), "leave 60° open"),
+        (list(range(-90, 91, 30)), "leave 180° open"),
+        ([0, 60, 120, 180], "leave 60° open"),
+        ([90], "leave 360° open"),
+    ],
+)
+def test_headings_that_leave_a_gap(tmp_path: Path, headings: list[float], message: str) -> None:
+    path = tmp_path / "ship.csv"
+    path.write_text(_long_wave_text(headings))
+    with pytest.raises(InvalidValue, match=message):
+        Vessel.from_csv(path)
+
+
+def test_a_heading_given_twice_around(tmp_path: Path) -> None:
+    path = tmp_path / "ship.csv"
+    path.write_text(_long_wave_text(list(range(-180, 181, 30))).replace("0.2,180,1,1.57", "0.2,180,1,1.0"))
+    with pytest.raises(InvalidValue, match="two responses at the one heading of 180°"):
+        Vessel.from_csv(path)
