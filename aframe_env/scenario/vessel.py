@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import warnings
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from importlib.resources import files
@@ -12,7 +13,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.validation import InvalidValue, require_vector
+from aframe_env.scenario.long_waves import long_wave_remark
+from aframe_env.validation import InvalidValue, ResponseTableWarning, require_vector
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -175,9 +177,17 @@ def _grid(rows: FloatArray, path: Path) -> tuple[FloatArray, FloatArray, Complex
             f"must be there once with each of the {len(degrees)} headings"
         )
     ordered = rows[np.argsort(place)].reshape(len(frequencies), len(degrees), -1)
-    response = ordered[:, :, 2::2] * np.exp(1j * ordered[:, :, 3::2])
-    degrees, response = _circle(degrees, response, path)
-    return frequencies, np.radians(degrees), np.ascontiguousarray(response)
+    amplitudes, phases = ordered[:, :, 2::2], ordered[:, :, 3::2]
+    circle, response = _circle(degrees, amplitudes * np.exp(1j * phases), path)
+    remark = long_wave_remark(frequencies, np.radians(degrees), amplitudes, phases)
+    if remark:
+        warnings.warn(
+            f"{path}: in the longest wave, {frequencies[0]:g} rad/s, {remark}. A wave that is long for the ship "
+            "carries it along: see 'A vessel's response' in docs/scenario-files.md",
+            ResponseTableWarning,
+            stacklevel=3,
+        )
+    return frequencies, np.radians(circle), np.ascontiguousarray(response)
 
 
 def _circle(degrees: FloatArray, response: ComplexArray, path: Path) -> tuple[FloatArray, ComplexArray]:
