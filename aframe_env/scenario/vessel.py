@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from importlib.resources import files
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,11 @@ COLUMNS = (
     "heading_deg",
     *(f"{dof}_{part}" for dof in ("surge", "sway", "heave", "roll", "pitch", "yaw") for part in ("amp", "phase")),
 )
+
+DIED_OUT: Final = 0.05
+"""Surge, sway and heave [m/m] of a ship that short waves leave alone."""
+FALL: Final = 1.25
+"""Where a response that has not died out is nothing, in last frequencies of its table."""
 
 # Ship axes (x forward, y to port) to the deck's (x aft, y to starboard): half a turn about z.
 _TO_DECK = np.array([-1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
@@ -134,6 +140,23 @@ class Vessel:
     def deck_response(self) -> ComplexArray:
         """Response (F, D, 6) of the deck frame {D}: x aft, y to starboard, z up."""
         return np.ascontiguousarray(self.response_at(self.deck_position) * _TO_DECK)
+
+    @cached_property
+    def dies_out(self) -> bool:
+        """Whether the ship hardly moves any more (5 % of the wave) at the table's highest frequency."""
+        return bool(np.abs(self.response[-1, :, :3]).max() < DIED_OUT)
+
+    @cached_property
+    def deck_table(self) -> tuple[FloatArray, ComplexArray]:
+        """Frequencies (F,) and ``deck_response`` (F, D, 6) to look up, of which both ends are held.
+
+        A table that ends before the response has died out goes on to nothing, a quarter above its last frequency.
+        """
+        if self.dies_out:
+            return self.frequencies, self.deck_response
+        nothing = np.zeros((1, *self.deck_response.shape[1:]), dtype=np.complex128)
+        frequencies = np.append(self.frequencies, FALL * self.frequencies[-1])
+        return frequencies, np.concatenate([self.deck_response, nothing])
 
 
 @cache
