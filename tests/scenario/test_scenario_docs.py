@@ -98,8 +98,9 @@ def test_the_examples_are_read(tmp_path: Path) -> None:
 
 def test_the_csv_examples_are_read(tmp_path: Path) -> None:
     record, response = (text.splitlines() for language, text in BLOCKS if language == "csv")
-    # Two samples are no record: they go on in the same manner.
-    more = [re.sub(r"^[\d.]+", f"{0.5 * k}", record[-1]) for k in range(2, 14)]
+    # Two samples are no record: they go on in the same manner, evenly.
+    cells = np.array([[float(cell) for cell in line.split(",")] for line in record[-2:]])
+    more = [",".join(f"{cell:.9g}" for cell in cells[0] + k * (cells[1] - cells[0])) for k in range(2, 14)]
     (tmp_path / "record.csv").write_text("\n".join([*record, *more]))
     assert RecordedMotion.from_csv(tmp_path / "record.csv").duration == 6.5
     # One frequency in two headings is no ship: the rest is the package's own, which is like it.
