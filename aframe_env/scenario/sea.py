@@ -170,8 +170,9 @@ class SeaMotion:
         ):
             if share > NOTABLE:
                 warnings.warn(
-                    f"{100.0 * share:.0f} % of the sea's variance (Tp {self.sea.tp:g} s) lies {side} the frequencies "
-                    f"of the response of {vessel.name!r}, {low:g} to {vessel.frequencies[-1]:g} rad/s: {what}",
+                    # The same words for every sea of a vessel: Python shows them once, however many are drawn.
+                    f"more than {100.0 * NOTABLE:.0f} % of a sea's variance lies {side} the frequencies of the "
+                    f"response of {vessel.name!r}, {low:g} to {vessel.frequencies[-1]:g} rad/s: {what}",
                     SeaBeyondTableWarning,
                     stacklevel=4,
                 )
