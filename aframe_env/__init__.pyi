@@ -8,7 +8,13 @@ from .scenario.scenario import Scenario
 from .scenario.sea import Sea, SeaMotion
 from .scenario.sensors import Channel, Sensors
 from .scenario.vessel import Vessel
-from .validation import InvalidValue, SmallRotationWarning
+from .validation import (
+    InvalidValue,
+    RecordNoiseWarning,
+    ResponseTableWarning,
+    SeaBeyondTableWarning,
+    SmallRotationWarning,
+)
 
 ENV_ID: str
 __version__: str
@@ -21,12 +27,15 @@ __all__ = [
     "Harmonic",
     "HarmonicMotion",
     "InvalidValue",
+    "RecordNoiseWarning",
     "RecordedMotion",
     "RecordedWindow",
+    "ResponseTableWarning",
     "Rope",
     "Scenario",
     "ScenarioDistribution",
     "Sea",
+    "SeaBeyondTableWarning",
     "SeaMotion",
     "Sensors",
     "SmallRotationWarning",

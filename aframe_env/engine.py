@@ -15,7 +15,7 @@ from aframe_env.dynamics.start import hang_load, inner_steps, longest_inner_step
 from aframe_env.dynamics.step import step_kernels
 from aframe_env.dynamics.wave_components import component_kernels
 from aframe_env.scenario import Scenario
-from aframe_env.scenario.motion import Components, ShipMotion, TabledMotion, has_components
+from aframe_env.scenario.motion import Components, Coordinate, ShipMotion, TabledMotion, has_components
 from aframe_env.validation import InvalidValue, require_integer, require_number
 
 FloatArray = npt.NDArray[np.float64]
@@ -204,6 +204,7 @@ class Engine:
         row = np.zeros(at.slots(self._components))
         _fill_parameters(row, scenario, times)
         row[at.RECORD], row[at.RECORD_LENGTH] = record, record_length
+        row[at.YAW_START] = self._records.lines[record, Coordinate.YAW] if record_length else 0.0
         row[at.NODE_SEGMENTS] = segments
         component_kernels().write(row, components.frequency, components.response, segments * times.segment)
         self._kernels_of_one.start(row[None], self._components, self._records.lines)

@@ -20,6 +20,18 @@ class SmallRotationWarning(UserWarning):
     """An rfe of the full model has turned by more than the linear kinematics of eq. (10) can take."""
 
 
+class ResponseTableWarning(UserWarning):
+    """A vessel's table was written in other units or with other signs, going by its longest wave."""
+
+
+class SeaBeyondTableWarning(UserWarning):
+    """A notable part of a sea has frequencies for which the vessel's table says nothing."""
+
+
+class RecordNoiseWarning(UserWarning):
+    """The rounding or noise of a recorded motion is a notable part of its acceleration."""
+
+
 class InvalidValue(ValueError):
     """A value outside what the model can take. The message names it, its range and its unit."""
 

@@ -74,6 +74,7 @@ class Tables(NamedTuple):
 def tables_of(distribution: ScenarioDistribution, row: FloatArray, max_inner_step: float | None) -> Tables:
     """Tables of a distribution; ``row`` (slots,) is any row of it at its start."""
     d, winch = distribution, distribution.crane.winch
+    frequencies, response = d.vessel.deck_table
     gamma: Range = 0.0 if d.gamma == "dnv" else d.gamma
     if d.spectrum == "pierson-moskowitz":
         gamma = 1.0
@@ -84,9 +85,9 @@ def tables_of(distribution: ScenarioDistribution, row: FloatArray, max_inner_ste
         limits=np.array([max_inner_step or 0.0, d.ramp, winch.min_rope_length, winch.max_rope_length]),
         frequency_quantiles=sea.frequency_quantiles(),
         direction_quantiles=sea.direction_quantiles(d.spreading),
-        frequencies=d.vessel.frequencies,
+        frequencies=frequencies,
         headings=d.vessel.headings,
-        response=d.vessel.deck_response,
+        response=response,
     )
 
 

@@ -99,6 +99,8 @@ HALF_STEP_DECAY: Final = _take(1)
 RECORD: Final = _take(1)
 """First line of the row's recorded motion in the engine's table, or -1."""
 RECORD_LENGTH: Final = _take(1)
+YAW_START: Final = _take(1)
+"""Yaw that the ramp builds up the yaw about: a record's first, which may be a compass heading; else 0."""
 
 # Scratch of one control step.
 DUE: Final = _take(1)

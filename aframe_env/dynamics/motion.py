@@ -126,7 +126,10 @@ def read_record(row: Block, records: npt.NDArray[np.float64], span: Span) -> Non
 
 @scalar
 def place_pulley(row: Block, span: Span) -> None:
-    """Apply the ramp to the deck's motion, and carry the pulley with the deck, eq. (38), at the next node."""
+    """Apply the ramp to the deck's motion, and carry the pulley with the deck, eq. (38), at the next node.
+
+    The motion builds up from nothing, the yaw from YAW_START.
+    """
     lanes = span.stride
     for j in range(span.begin, span.end):
         time = row[at.NODE_STEP * lanes + j] * row[at.CONTROL_PERIOD * lanes + j]
@@ -137,6 +140,10 @@ def place_pulley(row: Block, span: Span) -> None:
             row[(at.NODE + dof) * lanes + j] = r * q
             row[(at.NODE + 6 + dof) * lanes + j] = r * dq + dr * q
             row[(at.NODE + 12 + dof) * lanes + j] = r * row[(at.NODE + 12 + dof) * lanes + j] + 2.0 * dr * dq + ddr * q
+        start = row[at.YAW_START * lanes + j]
+        row[(at.NODE + 5) * lanes + j] += (1.0 - r) * start
+        row[(at.NODE + 11) * lanes + j] -= dr * start
+        row[(at.NODE + 17) * lanes + j] -= ddr * start
     for j in range(span.begin, span.end):
         x = row[at.PULLEY_ON_DECK * lanes + j]
         y = row[(at.PULLEY_ON_DECK + 1) * lanes + j]

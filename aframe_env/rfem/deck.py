@@ -10,7 +10,7 @@ from aframe_env.dynamics.motion import smooth_ramp
 from aframe_env.dynamics.transforms import turn
 from aframe_env.rfem.beam import Array
 from aframe_env.scenario import Scenario
-from aframe_env.scenario.motion import has_components, require_coverage
+from aframe_env.scenario.motion import Coordinate, has_components, require_coverage
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +38,8 @@ class DeckStates:
 def deck_coordinates(scenario: Scenario, step: float, count: int) -> Array:
     """The deck's six coordinates with the scenario's ramp, their rates and accelerations: (3, count, 6).
 
+    A record's yaw builds up about its first.
+
     Args:
         scenario: Its motion and its ramp.
         step: Of the times 0, step, 2 step, ...; s.
@@ -56,7 +58,11 @@ def deck_coordinates(scenario: Scenario, step: float, count: int) -> Array:
         return motion
     place, rate, acceleration = motion
     r, dr, ddr = np.array([smooth_ramp(time, 1.0 / scenario.ramp, 0.0) for time in times.tolist()]).T[:, :, None]
-    return np.stack([r * place, r * rate + dr * place, r * acceleration + 2.0 * dr * rate + ddr * place])
+    start = np.zeros(6)
+    if not has_components(scenario.motion):
+        start[Coordinate.YAW] = place[0, Coordinate.YAW]
+    place = place - start
+    return np.stack([start + r * place, r * rate + dr * place, r * acceleration + 2.0 * dr * rate + ddr * place])
 
 
 def deck_states(coordinates: Array) -> DeckStates:

@@ -10,6 +10,7 @@ frame.
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -20,7 +21,7 @@ import scipy
 
 from aframe_env.scenario.motion import COORDINATES, FloatArray
 from aframe_env.text import read_csv
-from aframe_env.validation import InvalidValue, require_number
+from aframe_env.validation import InvalidValue, RecordNoiseWarning, require_number
 
 _LENGTHS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
 _ANGLES: Final = {"rad": 1.0, "deg": math.pi / 180.0}
@@ -35,6 +36,20 @@ MIN_SAMPLES: Final = 12
 """Fewest samples of a record: twice what one quintic piece of the spline rests on."""
 GAP: Final = 1.5
 """A time step longer than this many medians is a gap."""
+ORDER: Final = 10
+"""Of the differences that noise is told by; a record has more samples."""
+NOISE_GAIN: Final = 3.9
+"""Acceleration of a quintic spline through white noise of deviation 1 at steps of 1, root mean square."""
+ARM: Final = 10.0
+"""What angular accelerations are weighed by, m: about the pulley's distance from the deck's origin."""
+NOTABLE: Final = 0.25
+"""Acceleration of noise in parts of the ship's own that is worth a warning."""
+LEAST: Final = 0.05
+"""And in m/s²."""
+ROUNDING: Final = 1e-9
+"""What a time may lie beyond the end, s."""
+MAX_LINES: Final = 20_000_000
+"""Most lines of a motion's table: three weeks at 10 Hz, some 2.7 GiB."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,7 +90,29 @@ class RecordedMotion:
         coordinates.setflags(write=False)
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "coordinates", coordinates)
-        object.__setattr__(self, "_spline", scipy.interpolate.make_interp_spline(times, coordinates, k=5))
+        noise = _noise(times, coordinates)
+        object.__setattr__(self, "_spline", _spline(times, coordinates, noise))
+        self._warn_of(noise)
+
+    def _warn_of(self, noise: FloatArray) -> None:
+        """Warn where the noise (6,) m, rad of the samples is a notable part of the accelerations."""
+        step = float(np.median(np.diff(self.times)))
+        between = np.concatenate([self.times, 0.5 * (self.times[1:] + self.times[:-1])])
+        arms = np.repeat([1.0, ARM], 3)
+        false = arms * NOISE_GAIN * noise / step**2
+        whole = arms * np.sqrt(np.mean(self.at(between)[2] ** 2, axis=0))
+        own = math.sqrt(max(np.sum(whole**2) - np.sum(false**2), 0.0))
+        sum_of_false = math.sqrt(np.sum(false**2))
+        if sum_of_false > max(NOTABLE * own, LEAST):
+            worst = int(np.argmax(false))
+            unit = "m" if worst < 3 else "rad"
+            warnings.warn(
+                f"{self.origin}: rounding or noise of its samples, {step:.3g} s apart, is {sum_of_false:.2g} m/s² of "
+                f"acceleration beside {own:.2g} m/s² of the ship's own, most of it by {COORDINATES[worst]} "
+                f"({noise[worst]:.2g} {unit}): smooth the record, or log it finer",
+                RecordNoiseWarning,
+                stacklevel=4,
+            )
 
     @classmethod
     def from_csv(cls, path: str | Path) -> RecordedMotion:
@@ -101,7 +138,7 @@ class RecordedMotion:
         """
         t = np.atleast_1d(np.asarray(times, dtype=np.float64))
         for extreme in (t.min(), t.max()) if t.size else ():
-            require_number("time", float(extreme), "s", low=0.0, high=self.duration)
+            require_number("time", float(extreme), "s", low=0.0, high=self.duration + ROUNDING)
         spline: scipy.interpolate.BSpline = self._spline  # type: ignore[attr-defined]
         return np.stack([spline(t), spline(t, nu=1), spline(t, nu=2)])
 
@@ -125,8 +162,9 @@ class RecordedWindow:
 
     def __post_init__(self) -> None:
         longest = self.record.duration
-        require_number("duration", self.duration, "s", low=0.0, high=longest, low_open=True)
-        require_number("start", self.start, "s", low=0.0, high=longest - self.duration)
+        require_number("start", self.start, "s", low=0.0, high=longest)
+        left = longest - self.start
+        require_number("duration", self.duration, "s", low=0.0, high=left + ROUNDING, low_open=True)
 
     @property
     def origin(self) -> str:
@@ -142,9 +180,80 @@ class RecordedWindow:
         return np.concatenate(list(self.at(grid(self.duration, period))), axis=1)
 
 
+def _noise(times: FloatArray, coordinates: FloatArray) -> FloatArray:
+    """Standard deviation (6,) of the part of each coordinate that no motion has which the samples are fine enough for.
+
+    By divided differences of an order that leaves little of a motion with four samples a period or more.
+    """
+    count = len(times) - ORDER
+    scaled = times / np.median(np.diff(times))
+    weights = np.ones((ORDER + 1, count))
+    for i in range(ORDER + 1):
+        for j in range(ORDER + 1):
+            if i != j:
+                weights[i] /= scaled[i : i + count] - scaled[j : j + count]
+    weights /= np.sqrt(np.sum(weights**2, axis=0))
+    differences = sum(weights[i][:, None] * coordinates[i : i + count] for i in range(ORDER + 1))
+    return np.asarray(np.sqrt(np.mean(np.square(differences), axis=0)))
+
+
+def _spline(times: FloatArray, coordinates: FloatArray, noise: FloatArray) -> scipy.interpolate.BSpline:
+    """The quintic spline through the samples.
+
+    At the ends, where noise turns a spline most, a coordinate has rate and acceleration of the polynomial that follows
+    its samples there within their noise (6,), where there is one.
+    """
+    spline = scipy.interpolate.make_interp_spline(times, coordinates, k=5)
+    start, end = (np.stack([spline(times[k], nu=1), spline(times[k], nu=2)]) for k in (0, -1))
+    fitted = False  # Unless a coordinate is, the spline stays as it is, to the bit.
+    for dof in range(6):
+        for derivatives, time, value, way in (
+            (start, times - times[0], coordinates[:, dof], 1.0),
+            (end, times[-1] - times[::-1], coordinates[::-1, dof], -1.0),
+        ):
+            fit = _smooth_end(time, value, float(noise[dof]))
+            if fit is not None:
+                derivatives[:, dof] = way * fit[0], fit[1]
+                fitted = True
+    if not fitted:
+        return spline
+    ends = [[(1, each[0]), (2, each[1])] for each in (start, end)]
+    # The stubs know conditions by name alone.
+    fitted_spline: scipy.interpolate.BSpline = scipy.interpolate.make_interp_spline(
+        times,
+        coordinates,
+        k=5,
+        bc_type=ends,  # type: ignore[call-overload]
+    )
+    return fitted_spline
+
+
+def _smooth_end(times: FloatArray, values: FloatArray, noise: float) -> tuple[float, float] | None:
+    """Rate and acceleration at time 0 of the quintic that follows the first values (T,) longest within their noise."""
+    found = None
+    count = MIN_SAMPLES
+    while noise > 0.0 and count <= len(times):
+        x = times[:count] / times[count - 1]
+        powers = np.vander(x, 6, increasing=True)
+        coefficients = np.linalg.lstsq(powers, values[:count], rcond=None)[0]
+        left = np.sum((powers @ coefficients - values[:count]) ** 2) / (count - 6)
+        # Within two standard errors of a variance from so many samples.
+        if left > noise**2 * (1.0 + 2.0 * math.sqrt(2.0 / (count - 6))):
+            break
+        found = float(coefficients[1] / times[count - 1]), float(2.0 * coefficients[2] / times[count - 1] ** 2)
+        count = count * 3 // 2
+    return found
+
+
 def grid(duration: float, period: float) -> FloatArray:
     """Times 0, ``period``, ... up to ``duration`` (T,) s."""
     require_number("period", period, "s", low=0.0, high=1e6, low_open=True)
+    if duration / period >= MAX_LINES:
+        raise InvalidValue(
+            f"{duration:g} s of recorded motion at steps of {period:g} s take {duration / period * 18 * 8 / 2**30:.3g} "
+            f"GiB: must be at most {MAX_LINES * period:g} s; take a stretch with start and duration, or mend the unit "
+            "of time"
+        )
     # A duration that is a whole number of periods up to rounding has its last line too.
     count = math.floor(duration / period + 1e-6) + 1
     return np.asarray(np.minimum(np.arange(count) * period, duration))

@@ -9,6 +9,7 @@ same waves with their phases.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
@@ -20,10 +21,21 @@ import numpy.typing as npt
 from aframe_env.dynamics.compiling import kernel
 from aframe_env.dynamics.wave_components import draw_wave, respond, response_cell
 from aframe_env.scenario.motion import ComplexArray, Components, FloatArray
-from aframe_env.scenario.vessel import Vessel
-from aframe_env.validation import require_choice, require_instance, require_integer, require_number
+from aframe_env.scenario.vessel import FALL, Vessel
+from aframe_env.validation import (
+    SeaBeyondTableWarning,
+    require_choice,
+    require_instance,
+    require_integer,
+    require_number,
+)
 
 SPECTRA: tuple[str, ...] = ("jonswap", "pierson-moskowitz")
+
+NOTABLE: Final = 0.05
+"""Share of a sea's variance outside a vessel's table that is worth a warning."""
+ALL_ABOVE, ALL_BELOW = 0.6, 3.0
+"""Peak frequencies between which more than 95 % of any sea's variance lies, on either side."""
 
 FULL_TURN = 2.0 * math.pi
 """rad."""
@@ -95,6 +107,14 @@ class Sea:
         scale = self.hs**2 / 16.0 / energy * self.tp / (2.0 * math.pi)
         return np.asarray(scale * _shape(x, self.peak_enhancement))
 
+    def share_below(self, frequency: float) -> float:
+        """Share of the sea's variance below an angular frequency [rad/s], from 0 to 1."""
+        place = gamma_place(self.peak_enhancement)
+        line = min(int(place), len(_GAMMAS) - 2)
+        table = frequency_quantiles()[line : line + 2]
+        quantiles = table[0] + (place - line) * (table[1] - table[0])
+        return float(np.interp(frequency * self.tp / FULL_TURN, quantiles, np.linspace(0.0, 1.0, _QUANTILES)))
+
     def waves(self) -> Waves:
         """Return the realisation: one regular wave for each component."""
         frequency, direction, phase = _sea_kernels().realise(
@@ -139,18 +159,40 @@ class SeaMotion:
     def __post_init__(self) -> None:
         require_instance("sea", self.sea, Sea)
         require_instance("vessel", self.vessel, Vessel)
+        self._warn_of_waves_beyond()
+
+    def _warn_of_waves_beyond(self) -> None:
+        """Warn where the vessel's table says nothing of a notable part of the sea."""
+        vessel, peak = self.vessel, FULL_TURN / self.sea.tp
+        low, high = vessel.frequencies[0], math.inf if vessel.dies_out else vessel.frequencies[-1]
+        if low < ALL_ABOVE * peak and high > ALL_BELOW * peak:
+            return
+        below, above = self.sea.share_below(low), 1.0 - self.sea.share_below(high)
+        for share, side, what in (
+            (below, "below", "there it is held"),
+            (above, "above", f"there it falls to nothing, at {FALL * high:.3g} rad/s"),
+        ):
+            if share > NOTABLE:
+                warnings.warn(
+                    # The same words for every sea of a vessel: Python shows them once, however many are drawn.
+                    f"more than {100.0 * NOTABLE:.0f} % of a sea's variance lies {side} the frequencies of the "
+                    f"response of {vessel.name!r}, {low:g} to {vessel.frequencies[-1]:g} rad/s: {what}",
+                    SeaBeyondTableWarning,
+                    stacklevel=4,
+                )
 
     def components(self) -> Components:
         """Return the deck's response to each wave."""
         waves = self.sea.waves()
+        frequencies, table = self.vessel.deck_table
         response = _sea_kernels().respond(
             waves.frequency,
             waves.direction,
             waves.amplitude,
             waves.phase,
-            self.vessel.frequencies,
+            frequencies,
             self.vessel.headings,
-            self.vessel.deck_response,
+            table,
         )
         return Components(waves.frequency, response)
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from importlib.resources import files
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from aframe_env.scenario.long_waves import long_wave_remark
 from aframe_env.text import read_csv
-from aframe_env.validation import InvalidValue, require_vector
+from aframe_env.validation import InvalidValue, ResponseTableWarning, require_vector
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -22,6 +25,11 @@ COLUMNS = (
     "heading_deg",
     *(f"{dof}_{part}" for dof in ("surge", "sway", "heave", "roll", "pitch", "yaw") for part in ("amp", "phase")),
 )
+
+DIED_OUT: Final = 0.05
+"""Surge, sway and heave [m/m] of a ship that short waves leave alone."""
+FALL: Final = 1.25
+"""Where a response that has not died out is nothing, in last frequencies of its table."""
 
 # Ship axes (x forward, y to port) to the deck's (x aft, y to starboard): half a turn about z.
 _TO_DECK = np.array([-1.0, -1.0, 1.0, -1.0, -1.0, 1.0])
@@ -67,7 +75,7 @@ class Vessel:
         where the latter is missing). Then the columns ``omega_rad_s, heading_deg, surge_amp, surge_phase, ...,
         yaw_amp, yaw_phase``: amplitudes in m/m and rad/m, phases (lead) in rad, conventions as above. Every
         combination of frequency and heading must be there; headings from 0 to 180° (the rest is then the mirror
-        image) or to 360°, at steps of 45° at the most.
+        image) or all around, from wherever, at steps of 45° at the most.
         """
         path = Path(path)
         name, reference = path.stem, (0.0, 0.0, 0.0)
@@ -127,6 +135,23 @@ class Vessel:
         """Response (F, D, 6) of the deck frame {D}: x aft, y to starboard, z up."""
         return np.ascontiguousarray(self.response_at(self.deck_position) * _TO_DECK)
 
+    @cached_property
+    def dies_out(self) -> bool:
+        """Whether the ship hardly moves any more (5 % of the wave) at the table's highest frequency."""
+        return bool(np.abs(self.response[-1, :, :3]).max() < DIED_OUT)
+
+    @cached_property
+    def deck_table(self) -> tuple[FloatArray, ComplexArray]:
+        """Frequencies (F,) and ``deck_response`` (F, D, 6) to look up, of which both ends are held.
+
+        A table that ends before the response has died out goes on to nothing, a quarter above its last frequency.
+        """
+        if self.dies_out:
+            return self.frequencies, self.deck_response
+        nothing = np.zeros((1, *self.deck_response.shape[1:]), dtype=np.complex128)
+        frequencies = np.append(self.frequencies, FALL * self.frequencies[-1])
+        return frequencies, np.concatenate([self.deck_response, nothing])
+
 
 @cache
 def _supply() -> Vessel:
@@ -146,8 +171,8 @@ def _number(text: str, where: str, name: str) -> float:
 def _check_row(row: list[float], where: str) -> None:
     if row[0] <= 0.0:
         raise InvalidValue(f"{where}: omega_rad_s = {row[0]:g} rad/s: must be above 0")
-    if not 0.0 <= row[1] <= 360.0:
-        raise InvalidValue(f"{where}: heading_deg = {row[1]:g}°: must be in [0, 360]")
+    if not -360.0 <= row[1] <= 360.0:
+        raise InvalidValue(f"{where}: heading_deg = {row[1]:g}°: must be in [-360, 360]")
     for column, value in zip(COLUMNS[2::2], row[2::2], strict=True):
         if value < 0.0:
             raise InvalidValue(f"{where}: {column} = {value:g}: must not be negative")
@@ -169,13 +194,50 @@ def _grid(rows: FloatArray, path: Path) -> tuple[FloatArray, FloatArray, Complex
             f"must be there once with each of the {len(degrees)} headings"
         )
     ordered = rows[np.argsort(place)].reshape(len(frequencies), len(degrees), -1)
-    response = ordered[:, :, 2::2] * np.exp(1j * ordered[:, :, 3::2])
-    if degrees[0] == 0.0 and degrees[-1] == 180.0:
-        degrees = np.concatenate([degrees, 360.0 - degrees[-2::-1]])
-        response = np.concatenate([response, response[:, -2::-1] * _MIRROR], axis=1)
-    elif degrees[0] == 0.0 and degrees[-1] < 360.0:
-        degrees = np.concatenate([degrees, [360.0]])
-        response = np.concatenate([response, response[:, :1]], axis=1)
-    if degrees[0] != 0.0 or degrees[-1] != 360.0 or np.diff(degrees).max() > 45.0:
-        raise InvalidValue(f"{path}: headings must go from 0 to 180° or around, at steps of 45° at the most")
-    return frequencies, np.radians(degrees), np.ascontiguousarray(response)
+    amplitudes, phases = ordered[:, :, 2::2], ordered[:, :, 3::2]
+    circle, response = _circle(degrees, amplitudes * np.exp(1j * phases), path)
+    remark = long_wave_remark(frequencies, np.radians(degrees), amplitudes, phases)
+    if remark:
+        warnings.warn(
+            f"{path}: in the longest wave, {frequencies[0]:g} rad/s, {remark}. A wave that is long for the ship "
+            "carries it along: see 'A vessel's response' in docs/scenario-files.md",
+            ResponseTableWarning,
+            stacklevel=3,
+        )
+    return frequencies, np.radians(circle), np.ascontiguousarray(response)
+
+
+def _circle(degrees: FloatArray, response: ComplexArray, path: Path) -> tuple[FloatArray, ComplexArray]:
+    """Headings [deg] from 0 to 360, and the response there, from those of a file in [-360, 360]."""
+    first, last = float(degrees[0]), float(degrees[-1])
+    around = degrees % 360.0
+    order = np.argsort(around, kind="stable")
+    around, response = around[order], response[:, order]
+    same = np.flatnonzero(np.diff(around) == 0.0)
+    for k in same:
+        apart = np.abs(response[:, k] - response[:, k + 1])
+        if (apart > 0.01 * np.abs(response).max(axis=(0, 1))).any():
+            raise InvalidValue(f"{path}: two responses at the one heading of {around[k]:g}°: must agree")
+    around, response = np.delete(around, same + 1), np.delete(response, same + 1, axis=1)
+    if last - first == 180.0 and first % 180.0 == 0.0:
+        # Half a circle from the bow to the stern, on either side.
+        mirrored = (-around) % 360.0
+        new = ~np.isin(mirrored, around)
+        around = np.concatenate([around, mirrored[new]])
+        order = np.argsort(around)
+        around, response = around[order], np.concatenate([response, response[:, new] * _MIRROR], axis=1)[:, order]
+    if around[0] > 0.0:
+        # Across the bow between the last heading and the first, as between any two.
+        share = around[0] / (around[0] + 360.0 - around[-1])
+        ahead = (1.0 - share) * response[:, :1] + share * response[:, -1:]
+        around, response = np.concatenate([[0.0], around]), np.concatenate([ahead, response], axis=1)
+        gap = around[1] + 360.0 - around[-1]
+    else:
+        gap = 360.0 - around[-1]
+    widest = max(gap, float(np.diff(around).max(initial=0.0)))
+    if widest > 45.0:
+        raise InvalidValue(
+            f"{path}: headings from {first:g} to {last:g}° leave {widest:g}° open: must go from 0 to 180°, or around, "
+            "at steps of 45° at the most"
+        )
+    return np.concatenate([around, [360.0]]), np.concatenate([response, response[:, :1]], axis=1)

@@ -194,7 +194,7 @@ def test_bad_records():
         ScenarioDistribution(records=(record(50.0),))
     with pytest.raises(InvalidValue, match=r"records = 'x\.csv': must be a RecordedMotion"):
         ScenarioDistribution(records=("x.csv",))
-    with pytest.raises(InvalidValue, match=r"start = 1.0 s: must be in \[0, 0\] s"):
+    with pytest.raises(InvalidValue, match=r"duration = 50.0 s: must be in \(0, 49\] s"):
         RecordedWindow(record=record(50.0), start=1.0, duration=50.0)
     with pytest.raises(InvalidValue, match=r"hs = 2.0: goes with seas, and records stand in their place"):
         ScenarioDistribution(records=(record(99.0),), hs=2.0)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from aframe_env import (
@@ -96,11 +98,24 @@ def test_the_examples_are_read(tmp_path: Path) -> None:
 
 def test_the_csv_examples_are_read(tmp_path: Path) -> None:
     record, response = (text.splitlines() for language, text in BLOCKS if language == "csv")
-    # Two samples are no record, and one frequency in two headings no ship: they go on in the same manner.
-    more = [re.sub(r"^[\d.]+", f"{0.5 * k}", record[-1]) for k in range(2, 14)]
+    # Two samples are no record: they go on in the same manner, evenly.
+    cells = np.array([[float(cell) for cell in line.split(",")] for line in record[-2:]])
+    more = [",".join(f"{cell:.9g}" for cell in cells[0] + k * (cells[1] - cells[0])) for k in range(2, 14)]
     (tmp_path / "record.csv").write_text("\n".join([*record, *more]))
     assert RecordedMotion.from_csv(tmp_path / "record.csv").duration == 6.5
-    values = response[-1].split(",", 2)[2]
-    others = [f"{omega},{heading},{values}" for omega in (0.1, 0.2) for heading in (0, 45, 90, 135, 180)]
-    (tmp_path / "ship.csv").write_text("\n".join([*response, *others[2:]]))
-    assert Vessel.from_csv(tmp_path / "ship.csv").name == "my ship"
+    # One frequency in two headings is no ship: the rest is the package's own, which is like it.
+    supply = Vessel.supply()
+    path = supply.path
+    assert path is not None
+    rows_of_supply = [line for line in path.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    kept = [line for line in rows_of_supply if line.split(",")[1] in ("0", "45", "90", "135", "180")]
+    given = {tuple(map(float, line.split(",")[:2])) for line in response[-2:]}
+    others = [line for line in kept if tuple(map(float, line.split(",")[:2])) not in given]
+    (tmp_path / "ship.csv").write_text("\n".join([*response, *others]))
+    vessel = Vessel.from_csv(tmp_path / "ship.csv")
+    assert vessel.name == "my ship"
+    wave = 0.1**2 / 9.81
+    for row in range(2):
+        c, s = math.cos(vessel.headings[row]), math.sin(vessel.headings[row])
+        np.testing.assert_allclose(vessel.response[0, row, :3], [-1j * c, -1j * s, 1.0], atol=0.02)
+        np.testing.assert_allclose(vessel.response[0, row, 3:5] / wave, [-1j * s, 1j * c], atol=0.03)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +12,7 @@ from scipy.integrate import simpson
 from scipy.interpolate import RegularGridInterpolator
 from waveresponse import JONSWAP
 
-from aframe_env import Sea, SeaMotion, Vessel
+from aframe_env import ScenarioDistribution, Sea, SeaBeyondTableWarning, SeaMotion, Vessel
 from aframe_env.scenario.sea import dnv_gamma
 
 FloatArray = npt.NDArray[np.float64]
@@ -167,3 +168,83 @@ def test_gamma_of_dnv() -> None:
 
 def test_calm_sea_moves_nothing() -> None:
     assert not SeaMotion(sea=sea(hs=0.0)).components().response.any()
+
+
+def _filtered(last: float, first: float = 0.2) -> Vessel:
+    """A ship whose heave is exp(-4.5 (ω/1.5)^4) of the wave, at frequencies from ``first`` to ``last``."""
+    frequencies, headings = np.arange(first, last + 1e-9, 0.05), np.linspace(0.0, 2.0 * math.pi, 25)
+    response = np.zeros((len(frequencies), 25, 6), dtype=complex)
+    response[..., 2] = _heave(frequencies)[:, None]
+    return Vessel(name="own", frequencies=frequencies, headings=headings, response=response, reference_point=(0, 0, 0))
+
+
+def _heave(omega: np.ndarray) -> np.ndarray:
+    return np.exp(-4.5 * (omega / 1.5) ** 4)
+
+
+def _outside(tp: float, low: float, high: float) -> float:
+    """Share of a sea's variance (γ 3.3) outside [low, high] rad/s, by another program's spectrum."""
+    omega = np.linspace(0.01, 60.0, 600_000)
+    density = JONSWAP(omega)(2.0, tp, gamma=3.3)[1]
+    inside = (omega >= low) & (omega <= high)
+    return float(1.0 - np.trapezoid(density * inside, omega) / np.trapezoid(density, omega))
+
+
+@pytest.mark.parametrize(
+    ("tp", "low", "high"), [(4.0, 0.0, 1.0), (9.0, 0.0, 1.0), (12.0, 0.6, 50.0), (20.0, 0.3, 50.0)]
+)
+def test_share_of_a_sea_beyond_a_frequency(tp: float, low: float, high: float) -> None:
+    sea = Sea(hs=2.0, tp=tp)
+    outside = sea.share_below(low) + 1.0 - sea.share_below(high)
+    assert outside == pytest.approx(_outside(tp, low, high), abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("tp", "first", "last", "words"),
+    [
+        (4.0, 0.2, 1.0, r"more than 5 % of a sea's variance lies above .*'own', 0.2 to 1 rad/s: there it falls"),
+        (6.0, 0.2, 1.0, "lies above"),
+        (12.0, 0.6, 2.0, "lies below .*there it is held"),
+        (4.0, 0.2, 2.0, None),
+        (9.0, 0.2, 2.0, None),
+        (14.0, 0.2, 1.0, None),
+    ],
+)
+def test_a_sea_beyond_the_table_is_told(tp: float, first: float, last: float, words: str | None) -> None:
+    sea, vessel = Sea(hs=2.0, tp=tp, components=2048), _filtered(last, first)
+    if words is None:
+        SeaMotion(sea=sea, vessel=vessel)
+    else:
+        assert _outside(tp, first, last) > 0.05
+        with pytest.warns(SeaBeyondTableWarning, match=words):
+            SeaMotion(sea=sea, vessel=vessel)
+
+
+def test_short_waves_beyond_the_table_do_not_carry_the_ship() -> None:
+    sea = Sea(hs=2.0, tp=4.0, components=2048)
+    with pytest.warns(SeaBeyondTableWarning):
+        motion = SeaMotion(sea=sea, vessel=_filtered(1.0))
+    omega = np.linspace(0.2, 6.0, 20_000)
+    density = JONSWAP(omega)(2.0, 4.0, gamma=3.3)[1]
+    true = math.sqrt(np.trapezoid(_heave(omega) ** 2 * density, omega))
+    held = 0.5 * _heave(np.array([1.0]))[0]
+    found = math.sqrt(np.sum(np.abs(motion.components().response[:, 2]) ** 2) / 2)
+    assert abs(found - true) < 0.1 * (held - true)
+
+
+def test_the_default_seas_lie_within_the_shipped_table() -> None:
+    source, rng = ScenarioDistribution(), np.random.default_rng(0)
+    for _ in range(300):
+        source.draw(rng)
+    vessel = Vessel.supply()
+    assert vessel.deck_table[1] is vessel.deck_response
+
+
+def test_a_distribution_beyond_the_table_is_told_once() -> None:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("default")
+        source, rng = ScenarioDistribution(vessel=_filtered(1.0), tp=(3.0, 6.0)), np.random.default_rng(0)
+        for _ in range(50):
+            source.draw(rng)
+    assert len({str(each.message) for each in caught}) == 1
+    assert len(caught) < 4
