@@ -25,19 +25,19 @@ from train.learn.run import main, train
 
 Start = Callable[..., subprocess.Popen[str]]
 PPO = {"n_envs": 3, "n_steps": 8, "batch_size": 12, "n_epochs": 2, "horizon": 2.0}
-SAC = {"n_envs": 3, "learning_starts": 12, "replay": 60, "batch_size": 8, "horizon": 2.0}
+SAC = {"n_envs": 3, "learning_starts": 12, "replay": 30, "batch_size": 8, "horizon": 2.0}
 CASES: dict[str, tuple[LearnerSpec, dict[str, Any]]] = {
-    "ppo": (ppo.SPEC, PPO),
-    "ppo on sensors": (ppo.SPEC, {**PPO, "observation": "sensors", "selected_by": 2}),
+    "ppo": (ppo.SPEC, {**PPO, "selected_by": 2}),
+    "ppo on sensors": (ppo.SPEC, {**PPO, "observation": "sensors"}),
     "ppo, predictive, on sensors": (
         ppo_predictive.SPEC,
-        {**PPO, "observation": "sensors", "practice": 4, "selected_by": 0, "critic_first": 2, "horizon": 4.0},
+        {**PPO, "observation": "sensors", "practice": 0, "selected_by": 0, "critic_first": 2},
     ),
-    "ppo, predictive": (ppo_predictive.SPEC, {**PPO, "practice": 0, "selected_by": 0}),
+    "ppo, predictive": (ppo_predictive.SPEC, {**PPO, "practice": 4, "selected_by": 0, "horizon": 4.0}),
     "sac": (sac.SPEC, SAC),
     "sac on sensors, speed": (sac.SPEC, {**SAC, "observation": "sensors", "action": "speed", "n_steps": 2}),
 }
-STEPS = 240
+STEPS = 120
 QUIET = Console(quiet=True)
 
 
@@ -62,7 +62,7 @@ def test_a_stopped_training_goes_on_to_the_same_agent(
 
     def stops(self: Checkpoints, learner: Any) -> Path:
         written.append(write(self, learner))
-        if len(written) in (1, 3, 7):
+        if len(written) in (1, 2, 4):
             raise checkpoint.Stopped(signal.SIGTERM)
         return written[-1]
 
@@ -130,14 +130,14 @@ def test_a_damaged_checkpoint_is_passed_over(
 def test_a_replay_is_written_once_and_what_is_overwritten_in_it_goes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stopped_after(60, "sac", tmp_path, monkeypatch)
+    stopped_after(30, "sac", tmp_path, monkeypatch)
     (newest,) = sorted((tmp_path / FOLDER).glob("[0-9]*"))[-1:]
     replay = json.loads(json.loads((newest / CARD).read_text())["card"])["replay"]
     spans = [(segment["from"], segment["to"]) for segment in replay["segments"]]
     assert [b for _, b in spans[:-1]] == [a for a, _ in spans[1:]]
     size = SAC["replay"] // SAC["n_envs"]
-    assert spans[-1][1] == replay["added"] == 59
-    assert spans[0][0] <= 59 - size < spans[0][1]
+    assert spans[-1][1] == replay["added"] == 29
+    assert spans[0][0] <= 29 - size < spans[0][1]
     # Those of the newest checkpoint and of the one before it.
     assert len(list((tmp_path / FOLDER / SEGMENTS).iterdir())) <= size + 1
 
@@ -196,9 +196,9 @@ def test_kills_at_random_moments_end_with_the_same_agent(tmp_path: Path, start: 
 def test_a_signal_writes_a_checkpoint_and_says_so(number: int, status: int, tmp_path: Path, start: Start) -> None:
     process = started(start, tmp_path / "run", "--timesteps", "10000000")
     wait_for_checkpoints(tmp_path / "run", 1)
-    # A second writer is refused meanwhile.
-    said = started(start, tmp_path / "run", "--timesteps", "10000000").communicate(timeout=120.0)[1]
-    assert said == f"error: out = '{tmp_path / 'run'}': another process is writing into it\n"
+    if number == signal.SIGTERM:  # a second writer is refused meanwhile
+        said = started(start, tmp_path / "run", "--timesteps", "10000000").communicate(timeout=120.0)[1]
+        assert said == f"error: out = '{tmp_path / 'run'}': another process is writing into it\n"
     process.send_signal(number)
     said, errors = process.communicate(timeout=120.0)
     assert (process.returncode, errors) == (status, "")
