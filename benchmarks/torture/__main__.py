@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from aframe_env.validation import require_integer
-from benchmarks.torture import kills
+from benchmarks.torture import full_disk, kills
 from benchmarks.torture.trial import Results, Trial, attempts
 from train.shared.cli import parse
 from train.shared.run_folder import command_line, user_errors
@@ -28,6 +28,8 @@ class Options:
 
     kills: int = 100
     """Kills of each learner's training."""
+    full_disks: int = 5
+    """Full disks of each command that writes."""
     only: str = ""
     """Trials whose name has this in it."""
     seed: int = 0
@@ -37,12 +39,14 @@ class Options:
 
     def __post_init__(self) -> None:
         require_integer("kills", self.kills, low=1, high=10**6)
+        require_integer("full_disks", self.full_disks, low=1, high=10**6)
         require_integer("seed", self.seed, low=0, high=2**32 - 1)
 
     @property
     def trials(self) -> list[Trial]:
         """What is tried."""
-        return [trial for trial in kills.trials(self.kills) if self.only in trial.name]
+        everything = [*kills.trials(self.kills), *full_disk.trials(self.full_disks)]
+        return [trial for trial in everything if self.only in trial.name]
 
 
 def run(options: Options, console: Console) -> int:

@@ -18,9 +18,9 @@ from benchmarks.torture.processes import start
 from benchmarks.torture.trial import Outcome, Trial
 from train.learn.checkpoint import FOLDER, KEPT, SEGMENTS
 
-_SMALL: Final = {
-    "train.ppo": ("--timesteps", 2000, "--n-envs", 8, "--n-steps", 16, "--batch-size", 64, "--n-epochs", 4),
-    "train.sac": ("--timesteps", 400, "--n-envs", 4, "--learning-starts", 40, "--replay", 240, "--batch-size", 32),
+SMALL: Final = {
+    "train.ppo": "--timesteps 2000 --n-envs 8 --n-steps 16 --batch-size 64 --n-epochs 4 --eval-scenarios 0",
+    "train.sac": "--timesteps 400 --n-envs 4 --learning-starts 40 --replay 240 --batch-size 32 --eval-scenarios 0",
 }
 """Options of a training of a few seconds; SAC's replay runs over."""
 _STARTING: Final = 3.0
@@ -66,7 +66,7 @@ class Killed:
             return _digest(Path(folder) / "run")
 
     def _start(self, folder: Path, every: float) -> ForkServerProcess:
-        options = (*_SMALL[self.module], "--eval-scenarios", 0, "--checkpoint-every", every, "--log")
+        options = (*SMALL[self.module].split(), "--checkpoint-every", every, "--log")
         return start(folder / "said", self.module, "--out", folder / "run", *options)
 
 
@@ -118,5 +118,5 @@ def trials(kills: int) -> list[Trial]:
             wanted=kills,
             attempt=Killed(module).attempt,
         )
-        for module in _SMALL
+        for module in SMALL
     ]

@@ -11,7 +11,7 @@ import pytest
 from rich.console import Console
 
 from benchmarks.torture import __main__ as torture
-from benchmarks.torture import kills
+from benchmarks.torture import full_disk, kills
 from benchmarks.torture.trial import Outcome, Trial
 
 if sys.platform == "win32":
@@ -26,6 +26,26 @@ def test_a_training_survives_kills(learner: str, tmp_path: Path) -> None:
     assert torture.run(options, QUIET) == 0
     (row,) = json.loads(options.out.read_text(encoding="utf-8"))["rows"].values()
     assert (row["tried"], row["survived"], row["failures"]) == (3, 3, [])
+
+
+def test_a_training_survives_a_full_disk(tmp_path: Path) -> None:
+    outcome = full_disk.Filled("train.ppo", mounted=False).attempt(np.random.default_rng(1), tmp_path, 1)
+    assert outcome.failures == ()
+    assert (outcome.survived, outcome.counts["had room enough"]) == (1, 0)
+
+
+def test_damaged_and_temporary_files_are_told_from_whole_ones(tmp_path: Path) -> None:
+    (tmp_path / "whole.json").write_text("{}")
+    (tmp_path / "whole.toml").write_text("a = 1")
+    assert list(full_disk.damaged(tmp_path)) == []
+    for name in ("half.json", "half.toml", "half.safetensors", ".left.json"):
+        (tmp_path / name).write_text("{")
+    assert [each.split()[0] for each in full_disk.damaged(tmp_path)] == [
+        ".left.json",
+        "half.json",
+        "half.safetensors",
+        "half.toml",
+    ]
 
 
 def test_another_agent_is_told_from_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -29,7 +29,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from train.learn.learner import Learner, Model, Remembers
 from train.learn.memory import Memory, into_learner, of_learner
-from train.shared.run_folder import versions, write_atomically
+from train.shared.run_folder import naming, versions, write_atomically
 
 FOLDER: Final = "checkpoints"
 KEPT: Final = 2
@@ -114,14 +114,15 @@ class Checkpoints:
         text = json.dumps(card)
         made = self.folder / f".{place.name}.{os.getpid()}"
         shutil.rmtree(made, ignore_errors=True)
-        made.mkdir(parents=True)
-        try:
-            _write(made / ARRAYS, arrays)
-            _write(made / CARD, json.dumps({"sha256": sha256(text.encode()).hexdigest(), "card": text}).encode())
-            made.rename(place)
-        except BaseException:
-            shutil.rmtree(made, ignore_errors=True)
-            raise
+        with naming(place):
+            try:
+                made.mkdir(parents=True)
+                _write(made / ARRAYS, arrays)
+                _write(made / CARD, json.dumps({"sha256": sha256(text.encode()).hexdigest(), "card": text}).encode())
+                made.rename(place)
+            except BaseException:
+                shutil.rmtree(made, ignore_errors=True)
+                raise
         self._segments = segments["segments"] if segments else []
         self._tidy()
         return place

@@ -16,7 +16,7 @@ from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from aframe_env.validation import InvalidValue
 from agents.learned.agent import WEIGHTS, load
 from train.evaluate.run import evaluate
-from train.learn.checkpoint import Checkpoints, KeepCheckpoints, Stopped, stop_by_signal
+from train.learn.checkpoint import FOLDER, Checkpoints, KeepCheckpoints, Stopped, stop_by_signal
 from train.learn.learner import LearnerSpec, Rows
 from train.learn.logs import open_logger, require_logs
 from train.learn.options import LearningOptions
@@ -132,8 +132,17 @@ def _train_one(spec: LearnerSpec, options: LearningOptions, console: Console) ->
     console.print(f"run folder: {folder}")
     if not (opened.taken_up and _learned(folder)):
         if not opened.taken_up:
+            # They would say of what begins now that it is finished.
+            for name in (METRICS, EVALUATED):
+                (folder / name).unlink(missing_ok=True)
             opened.record(options)
-        if status := _learn(spec, options, opened, console):
+        try:
+            status = _learn(spec, options, opened, console)
+        except OSError as error:
+            if any((folder / FOLDER).glob("[0-9]*")):
+                raise OSError(f"{error}; the last checkpoint is kept, and --resume {folder} goes on from it") from error
+            raise
+        if status:
             return status
     if options.eval_scenarios:
         evaluate(load(folder), folder, options.held_out, console)

@@ -156,6 +156,17 @@ def test_what_was_begun_with_overwrite_is_not_overwritten_by_resume(
     assert "goes on from 48 control steps" in capsys.readouterr().out
 
 
+def test_what_overwrites_a_finished_training_goes_on_as_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    spec, options = options_of("ppo", tmp_path / "whole", gamma=0.9)
+    assert train(spec, options, QUIET) == 0
+    spec, options = options_of("ppo", tmp_path / "parts")
+    assert train(spec, options, QUIET) == 0
+    spec, options = stopped_after(2, "ppo", tmp_path / "parts", monkeypatch, gamma=0.9, overwrite=True)
+    (tmp_path / "parts" / "metrics.json").unlink()  # as if it had been killed
+    assert train(spec, replace(options, overwrite=False), QUIET) == 0
+    assert agent(tmp_path / "parts") == agent(tmp_path / "whole")
+
+
 def test_other_options_are_not_taken_for_the_same_training(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     spec, options = stopped_after(3, "ppo", tmp_path, monkeypatch)
     with pytest.raises(InvalidValue, match="exists and is not empty"):
