@@ -33,7 +33,7 @@ _COMMANDS: Final = {
     "train.sac": f"{SMALL['train.sac']} --timesteps 120 --checkpoint-every 0 --out DISK/run",
     "train.drives": "--drive spline --objective omega2 --max-evaluations 60 --duration 12 --out DISK/run",
     "train.evaluate": "--scenarios 3 --privileged 0 --policies 'drum still' 'output zero' --out DISK/run",
-    "train.drive_map": "--amplitudes 1 2 --periods 8 --masses 5e4 --lengths 200 300 --held-out 2 --workers 1 "
+    "train.drive_map": "--amplitudes 1 2 --periods 8 9 --masses 4e4 5e4 --lengths 200 300 --held-out 2 --workers 1 "
     "--store DISK/jobs.sqlite --out DISK/run",
     "train.sensitivity": "--scenarios 1 --points 2 --samples 2 --workers 1 --out DISK/run",
     "train.tune": "--trials 1 --timesteps 512 --scenarios 2 --out DISK/run",
