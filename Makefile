@@ -5,7 +5,7 @@ BIN := .venv/bin
 
 .DEFAULT_GOAL := help
 
-.PHONY: help train demo docs drives test verify results bench compat check clean
+.PHONY: help train demo docs drives test verify results bench torture compat check clean
 
 help:
 	@echo "make train     learn to hold the load still and compare the agent (some five minutes)"
@@ -13,6 +13,7 @@ help:
 	@echo "make docs      build the documentation site, build/site/index.html"
 	@echo "make test      run the whole suite (some ten minutes)"
 	@echo "make check     lint, format, layers, types"
+	@echo "make torture   kill trainings, fill disks, and count what is lost (some ten minutes)"
 	@echo "make drives | verify | results | bench | compat | clean"
 
 train: .venv/installed
@@ -63,6 +64,9 @@ bench: .venv/installed-test .venv-peers/installed
 	$(BIN)/python -m benchmarks $(ARGS)
 	$(BIN)/python -m benchmarks.rfem
 	$(BIN)/python -m benchmarks.rfem_peer --peer-python .venv-peers/bin/python
+
+torture: .venv/installed-test
+	$(BIN)/python -m benchmarks.torture $(ARGS)
 
 # Other people's libraries on the wheel: up to half an hour on two busy cores, and 4 to 12 GB for the environments.
 compat: .venv/installed-test .venv-compat/learners/installed .venv-compat/rllib/installed

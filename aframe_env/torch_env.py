@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -14,7 +15,7 @@ from aframe_env.config import TaskConfig, task_config
 from aframe_env.dynamics.random import episode_uniforms
 from aframe_env.scenario import NUMBERS, Scenario
 from aframe_env.scenario.motion import require_coverage
-from aframe_env.simulation import Simulation
+from aframe_env.simulation import RowState, Simulation
 from aframe_env.validation import InvalidValue, require_integer
 
 if TYPE_CHECKING:
@@ -52,6 +53,14 @@ class Rows(Protocol):
 
         The cost is the rows' own memory, which the next call changes.
         """
+        ...
+
+    def get_state(self) -> dict[str, torch.Tensor]:
+        """Everything that the rows' rest depends on, as copies."""
+        ...
+
+    def set_state(self, state: Mapping[str, torch.Tensor]) -> None:
+        """Go back to a state that ``get_state`` returned."""
         ...
 
 
@@ -152,6 +161,24 @@ class AFrameHeaveTorchEnv:
         extras = {"time_outs": time_outs, "final_obs": final}
         return self.get_observations(), rewards, dones, extras
 
+    def get_state(self) -> dict[str, torch.Tensor]:
+        """Return everything that the rest of the rows' episodes, and all later ones, depend on, by name, as copies."""
+        own = {"observation": self._observation.clone(), "episode_length": self.episode_length_buf.clone()}
+        return own | self._rows.get_state()
+
+    def set_state(self, state: Mapping[str, torch.Tensor]) -> None:
+        """Go back to a state that ``get_state`` returned, in this environment or one of the same arguments.
+
+        The tensors may lie on any device.
+        """
+        mine = {name: tuple(tensor.shape) for name, tensor in self.get_state().items()}
+        theirs = {name: tuple(tensor.shape) for name, tensor in state.items()}
+        if theirs != mine:
+            raise InvalidValue(f"state: tensors of shape {theirs}: must be those of get_state(), {mine}")
+        self._observation = state["observation"].to(self.device, copy=True)
+        self.episode_length_buf = state["episode_length"].to(self.device, copy=True)
+        self._rows.set_state(state)
+
     def close(self) -> None:
         """Nothing to close."""
 
@@ -190,7 +217,7 @@ class ProcessorRows:
         """Put the rows that have ``finished`` (N,) bool at the start of new scenarios; observation (N, 14) of all."""
         indices = np.flatnonzero(finished.numpy())
         if len(indices):
-            self._simulation.reset_rows(indices, [(self._draw(i), 0) for i in indices.tolist()])
+            self._simulation.reset_rows(indices, [(self._draw(i, int(self._episodes[i])), 0) for i in indices.tolist()])
             self._episodes[indices] += 1
         return torch.from_numpy(self._simulation.observe())
 
@@ -205,12 +232,31 @@ class ProcessorRows:
         results = torch.from_numpy(simulation.results)
         return torch.from_numpy(simulation.observe()), results[:, task.COST], results[:, task.PARTED] > 0.0
 
-    def _draw(self, row: int) -> Scenario:
+    def get_state(self) -> dict[str, torch.Tensor]:
+        """Everything that the rows' rest depends on, as copies."""
+        rows = [self._simulation.copy_row(i).engine for i in range(self._simulation.rows)]
+        return {
+            "engine": torch.from_numpy(np.stack(rows)),
+            "steps": torch.from_numpy(self._simulation.steps.copy()),
+            "episodes": torch.from_numpy(self._episodes.copy()),
+            "seed": torch.tensor(self._seed),
+        }
+
+    def set_state(self, state: Mapping[str, torch.Tensor]) -> None:
+        """Go back to a state that ``get_state`` returned."""
+        engine, steps, episodes = (state[name].cpu().numpy() for name in ("engine", "steps", "episodes"))
+        self._seed = int(state["seed"])
+        self._episodes[:] = episodes
+        for i in range(self._simulation.rows):
+            scenario = self._draw(i, int(episodes[i]) - 1)
+            self._simulation.write_row(i, RowState(scenario, engine[i], None, int(steps[i])))
+
+    def _draw(self, row: int, episode: int) -> Scenario:
         source = self._simulation.source
         if isinstance(source, Scenario):
             return source
         numbers = np.empty(NUMBERS)
-        episode_uniforms(self._seed, row, int(self._episodes[row]), numbers)
+        episode_uniforms(self._seed, row, episode, numbers)
         return source.at(numbers)
 
 

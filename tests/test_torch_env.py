@@ -147,6 +147,33 @@ def test_bad_actions(actions: Any, words: str) -> None:
         make(3).step(actions)
 
 
+@pytest.mark.parametrize("scenario", [None, Scenario.paper(crane=FRAGILE)], ids=["random seas", "a rope that parts"])
+def test_others_go_on_from_a_state_as_these_do(scenario: Scenario | None) -> None:
+    arguments = {"scenario": scenario, "episode_duration": 1.0} if scenario else {"episode_duration": 1.0}
+    these, others = make(seed=7, **arguments), make(seed=8, **arguments)
+    moves = [torch.from_numpy(action) for action in speeds(3, 40)]
+    for action in moves[:17]:
+        these.step(action)
+    state = these.get_state()
+    others.set_state(state)
+    for env in (these, others):  # what was returned is a copy
+        seen = [env.step(action) for action in moves[17:]]
+        if env is these:
+            expected = seen
+            continue
+        for (a, *mine), (b, *theirs) in zip(expected, seen, strict=True):
+            assert torch.equal(a[GROUP], b[GROUP])
+            assert all(torch.equal(x, y) for x, y in zip(mine[:2], theirs[:2], strict=True))
+    assert sum(int(dones.sum()) for _, _, dones, _ in expected) >= 6
+    others.set_state(state)
+    assert torch.equal(others.step(moves[17])[0][GROUP], expected[0][0][GROUP])
+
+
+def test_a_state_of_other_rows_is_refused() -> None:
+    with pytest.raises(InvalidValue, match="must be those of get_state"):
+        make(3).set_state(make(4).get_state())
+
+
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a CUDA device")
 @pytest.mark.parametrize("device", ["cuda", "cuda:1"])
 def test_cuda_without_a_device_says_what_to_do(device: str) -> None:

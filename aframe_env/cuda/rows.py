@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,9 @@ class CudaRows:
         # A device array cannot be empty; no row follows the line that stands in.
         records = engine.records if len(engine.records) else np.zeros((1, 18))
         # Lanes beyond the last row are never looked at.
-        blocks = torch.zeros((self._blocks_of_threads, len(vector) * LANES), dtype=torch.float64, device=device)
+        blocks = self._memory = torch.zeros(
+            (self._blocks_of_threads, len(vector) * LANES), dtype=torch.float64, device=device
+        )
         self._state = torch.zeros((rows, len(task.STATE)), dtype=torch.float64, device=device)
         self._results = torch.zeros((rows, task.RESULTS), dtype=torch.float64, device=device)
         self._episodes = torch.zeros(rows, dtype=torch.int64, device=device)
@@ -100,6 +103,24 @@ class CudaRows:
             view(observation),
         )
         return observation, self._results[:, task.COST], self._results[:, task.PARTED] > 0.0
+
+    def get_state(self) -> dict[str, torch.Tensor]:
+        """Everything that the rows' rest depends on, as copies."""
+        return {name: tensor.clone() for name, tensor in self._tensors().items()} | {"seed": torch.tensor(self._seed)}
+
+    def set_state(self, state: Mapping[str, torch.Tensor]) -> None:
+        """Go back to a state that ``get_state`` returned."""
+        self._seed = int(state["seed"])
+        for name, tensor in self._tensors().items():
+            tensor.copy_(state[name])
+
+    def _tensors(self) -> dict[str, torch.Tensor]:
+        return {
+            "engine": self._memory,
+            "state": self._state,
+            "results": self._results,
+            "episodes": self._episodes,
+        }
 
     def _launch(self, kernel: Any, *arguments: Any) -> None:
         kernel[self._blocks_of_threads, LANES, stream(self.device)](*arguments)

@@ -64,8 +64,8 @@ CASES = {
 }
 
 
-def env(name: str, device: str) -> AFrameHeaveTorchEnv:
-    return AFrameHeaveTorchEnv(CASES[name].rows, device=device, seed=11, **CASES[name].arguments)
+def env(name: str, device: str, seed: int = 11) -> AFrameHeaveTorchEnv:
+    return AFrameHeaveTorchEnv(CASES[name].rows, device=device, seed=seed, **CASES[name].arguments)
 
 
 def actions(rows: int, steps: int) -> list[torch.Tensor]:
@@ -75,10 +75,17 @@ def actions(rows: int, steps: int) -> list[torch.Tensor]:
 
 
 def episodes(name: str, device: str) -> dict[str, np.ndarray]:
-    """Observations (steps + 1, rows, 14) and what else a step returns, over more than one episode."""
+    """Observations (steps + 1, rows, 14) and what else a step returns, over more than one episode.
+
+    Halfway other rows take over, from the state of these.
+    """
     rows = env(name, device)
     seen: dict[str, list[np.ndarray]] = {"observation": [rows.get_observations()[GROUP].cpu().numpy()]}
-    for action in actions(CASES[name].rows, CASES[name].steps):
+    for step, action in enumerate(actions(CASES[name].rows, CASES[name].steps)):
+        if step == CASES[name].steps // 2:
+            state = rows.get_state()
+            rows = env(name, device, seed=5)
+            rows.set_state(state)
         observation, reward, done, extras = rows.step(action.to(rows.device))
         for key, value in {"observation": observation[GROUP], "reward": reward, "done": done, **extras}.items():
             seen.setdefault(key, []).append(value.cpu().numpy().copy())

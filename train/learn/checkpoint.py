@@ -27,10 +27,9 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 
-from train.learn.learner import Learner
-from train.learn.memory import Memory, into_best, into_learner, of_best, of_learner
-from train.learn.sb3_env import TrainingVecEnv
-from train.shared.run_folder import versions, write_atomically
+from train.learn.learner import Learner, Model, Remembers
+from train.learn.memory import Memory, into_learner, of_learner
+from train.shared.run_folder import naming, versions, write_atomically
 
 FOLDER: Final = "checkpoints"
 KEPT: Final = 2
@@ -78,17 +77,6 @@ def stop_by_signal() -> Iterator[Stop]:
             signal.signal(number, handler)
 
 
-def can_be_kept(learner: Learner) -> bool:
-    """Whether there are checkpoints of a learner: those of rsl_rl have none, they learn in seconds."""
-    return isinstance(learner.model, BaseAlgorithm) and isinstance(learner.rows, TrainingVecEnv)
-
-
-def _kept_of(learner: Learner) -> tuple[BaseAlgorithm, TrainingVecEnv]:
-    assert isinstance(learner.model, BaseAlgorithm)
-    assert isinstance(learner.rows, TrainingVecEnv)
-    return learner.model, learner.rows
-
-
 @dataclass
 class Checkpoints:
     """The checkpoints of a training in its run folder."""
@@ -104,14 +92,14 @@ class Checkpoints:
 
     def write(self, learner: Learner) -> Path:
         """Write a checkpoint; the one before the last goes."""
-        model, rows = _kept_of(learner)
+        model, rows = learner.model, learner.rows
         place = self.folder / f"{model.num_timesteps:012d}"
         if place.is_dir():  # taken up again, and asked to stop before anything was learned
             return place
         memory = Memory()
         memory.put("rows", rows.memory())
-        memory.put("learner", of_learner(model))
-        memory.put("best", of_best(learner.best))
+        memory.put("learner", _of_model(model))
+        memory.put("best", learner.best.memory())
         replay = getattr(model, "replay_buffer", None)
         steps = model.num_timesteps // rows.num_envs
         segments = None if replay is None else self._write_replay(replay, steps)
@@ -126,22 +114,22 @@ class Checkpoints:
         text = json.dumps(card)
         made = self.folder / f".{place.name}.{os.getpid()}"
         shutil.rmtree(made, ignore_errors=True)
-        made.mkdir(parents=True)
-        try:
-            _write(made / ARRAYS, arrays)
-            _write(made / CARD, json.dumps({"sha256": sha256(text.encode()).hexdigest(), "card": text}).encode())
-            made.rename(place)
-        except BaseException:
-            shutil.rmtree(made, ignore_errors=True)
-            raise
+        with naming(place):
+            try:
+                made.mkdir(parents=True)
+                _write(made / ARRAYS, arrays)
+                _write(made / CARD, json.dumps({"sha256": sha256(text.encode()).hexdigest(), "card": text}).encode())
+                made.rename(place)
+            except BaseException:
+                shutil.rmtree(made, ignore_errors=True)
+                raise
         self._segments = segments["segments"] if segments else []
         self._tidy()
         return place
 
     def take_up(self, learner: Learner) -> dict[str, Any] | None:
         """Put the newest whole checkpoint into a learner that was built alike, and return its card; None for none."""
-        model, rows = _kept_of(learner)
-        replay = getattr(model, "replay_buffer", None)
+        replay = getattr(learner.model, "replay_buffer", None)
         for place in reversed(self._places()):
             found = _read(place)
             if found is None:
@@ -150,9 +138,9 @@ class Checkpoints:
             if replay is not None and not self._read_replay(replay, card["replay"]):
                 continue
             memory = Memory(arrays, card["values"])
-            rows.recall(memory.under("rows"))
-            into_learner(model, memory.under("learner"))
-            into_best(learner.best, learner.to_actor, memory.under("best"))
+            learner.rows.recall(memory.under("rows"))
+            _into_model(learner.model, memory.under("learner"))
+            learner.best.recall(memory.under("best"), learner.to_actor)
             return card
         return None
 
@@ -234,13 +222,27 @@ class KeepCheckpoints(BaseCallback):
         asked = self._stop.number
         if asked is None and time.monotonic() - self._last < self._every:
             return
-        if can_be_kept(self._learner):
-            begin = time.monotonic()
-            self._checkpoints.write(self._learner)
-            self._last = time.monotonic()
-            self.seconds += self._last - begin
+        begin = time.monotonic()
+        self._checkpoints.write(self._learner)
+        self._last = time.monotonic()
+        self.seconds += self._last - begin
         if asked is not None:
             raise Stopped(asked)
+
+
+def _of_model(model: Model) -> Memory:
+    if isinstance(model, BaseAlgorithm):
+        return of_learner(model)
+    assert isinstance(model, Remembers)
+    return model.memory()
+
+
+def _into_model(model: Model, memory: Memory) -> None:
+    if isinstance(model, BaseAlgorithm):
+        into_learner(model, memory)
+    else:
+        assert isinstance(model, Remembers)
+        model.recall(memory)
 
 
 def _storable(array: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:

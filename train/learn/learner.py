@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 
 from aframe_env import task
 from agents.learned.network import Actor
+from train.learn.memory import Memory, of_tensors, to_tensors
 from train.learn.options import LearningOptions
 
 
@@ -34,7 +35,20 @@ class Model(Protocol):
         ...
 
 
-class Rows(Protocol):
+@runtime_checkable
+class Remembers(Protocol):
+    """Interface of what checkpoints keep."""
+
+    def memory(self) -> Memory:
+        """Everything that its rest depends on."""
+        ...
+
+    def recall(self, memory: Memory) -> None:
+        """Put back what ``memory`` told of one with the same options."""
+        ...
+
+
+class Rows(Remembers, Protocol):
     """Interface of a learner's rows."""
 
     num_envs: int
@@ -62,6 +76,18 @@ class Best:
     timesteps: int = 0
     """Control steps that it has learned from."""
     actor: Actor | None = None
+
+    def memory(self) -> Memory:
+        """What is kept of it."""
+        if self.actor is None:
+            return Memory(values={"left": None, "timesteps": 0})
+        return Memory(of_tensors(self.actor.state_dict()).arrays, {"left": self.left, "timesteps": self.timesteps})
+
+    def recall(self, memory: Memory, to_actor: Callable[[], Actor]) -> None:
+        """Put back what ``memory`` told; ``to_actor`` makes an agent of its kind."""
+        if memory.values["left"] is not None:
+            self.left, self.timesteps, self.actor = memory.values["left"], memory.values["timesteps"], to_actor()
+            self.actor.load_state_dict(to_tensors(memory))
 
 
 @dataclass(frozen=True)

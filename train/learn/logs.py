@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from importlib.metadata import PackageNotFoundError, version
@@ -15,6 +16,7 @@ from stable_baselines3.common.logger import CSVOutputFormat, KVWriter, Logger, c
 
 from aframe_env.text import read_csv
 from aframe_env.validation import InvalidValue
+from train.shared.run_folder import naming
 
 LOGS: Final = ("tensorboard", "wandb", "mlflow")
 PROJECT: Final = "aframe-heave"
@@ -65,7 +67,7 @@ def open_logger(folder: Path, names: Sequence[str], options: Mapping[str, Any], 
 
     ``begun``: control steps that were learned from before an interruption; their figures stay.
     """
-    with ExitStack() as stack:
+    with naming(folder / "log", unless_named=True), _told_once(), ExitStack() as stack:
         earlier = _figures_until(begun, folder / "log" / "progress.csv")
         logger = configure(str(folder / "log"), ["csv", *(["tensorboard"] if "tensorboard" in names else [])])
         stack.callback(logger.close)
@@ -75,6 +77,22 @@ def open_logger(folder: Path, names: Sequence[str], options: Mapping[str, Any], 
             if name in names:
                 logger.output_formats.append(Figures(name, stack.enter_context(open_run(folder, options))))
         yield logger
+
+
+@contextmanager
+def _told_once() -> Iterator[None]:
+    """Leave errors of the disk to who learns: TensorBoard's thread hands them on, and prints a traceback."""
+    before = threading.excepthook
+
+    def tell(args: threading.ExceptHookArgs) -> None:
+        if not isinstance(args.exc_value, OSError):
+            before(args)
+
+    threading.excepthook = tell
+    try:
+        yield
+    finally:
+        threading.excepthook = before
 
 
 def _figures_until(timesteps: int, path: Path) -> list[dict[str, str]]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -18,8 +18,6 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from agents.control.kalman import Schedule, WaveBank
 from agents.control.predictive import PlanningConfig
 from agents.learned.features import FeatureConfig
-from agents.learned.network import Actor
-from train.learn.learner import Best
 
 FIXED: Final = (Schedule, WaveBank, PlanningConfig, FeatureConfig)
 """Kinds of objects that hold nothing but what was known at the start."""
@@ -58,11 +56,13 @@ class _Leaf:
 
 
 def of_object(root: object) -> Memory:
-    """What an object of this package remembers, and those that it holds: arrays and plain values."""
+    """What an object of this package remembers, and those that it holds: arrays, tensors and plain values."""
     memory = Memory()
     for leaf in _leaves(root):
         if isinstance(leaf.value, np.ndarray):
             memory.arrays[leaf.place] = leaf.value.copy()
+        elif isinstance(leaf.value, torch.Tensor):
+            memory.arrays[leaf.place] = _to_array(leaf.value)
         else:
             memory.values[leaf.place] = leaf.value
     return memory
@@ -78,6 +78,9 @@ def into_object(root: object, memory: Memory) -> None:
             else:
                 assert leaf.replace is not None, leaf.place
                 leaf.replace(array.copy())
+        elif isinstance(leaf.value, torch.Tensor):
+            assert leaf.replace is not None, leaf.place
+            leaf.replace(torch.from_numpy(memory.arrays[leaf.place].copy()).to(leaf.value.device))
         else:
             assert leaf.replace is not None
             leaf.replace(memory.values[leaf.place])
@@ -90,6 +93,8 @@ def _leaves(root: object) -> Iterator[_Leaf]:
         if isinstance(value, np.ndarray):
             if value.flags.writeable:
                 yield _Leaf(place, value, replace)
+        elif isinstance(value, torch.Tensor):
+            yield _Leaf(place, value, replace)
         elif value is None or isinstance(value, Scalar):
             if replace is not None:
                 yield _Leaf(place, value, replace)
@@ -109,14 +114,11 @@ def _leaves(root: object) -> Iterator[_Leaf]:
 def of_learner(model: BaseAlgorithm) -> Memory:
     """What a learner of Stable-Baselines3 remembers between two rollouts, its replay apart."""
     memory = Memory()
-    memory.put("policy", _of_tensors(model.policy.state_dict()))
+    memory.put("policy", of_tensors(model.policy.state_dict()))
     for name, optimizer in _optimizers(model).items():
-        state = optimizer.state_dict()
-        for index, tensors in state["state"].items():
-            memory.put(f"{name}/{index}", _of_tensors(tensors))
-        memory.values[f"{name}/rates"] = [group["lr"] for group in state["param_groups"]]
+        memory.put(name, of_optimizer(optimizer))
     for name, tensor in _tensors(model).items():
-        memory.arrays[name] = tensor.detach().numpy().copy()
+        memory.arrays[name] = _to_array(tensor)
     for name in _COUNTERS:
         if hasattr(model, name):
             memory.values[name] = getattr(model, name)
@@ -129,15 +131,9 @@ def of_learner(model: BaseAlgorithm) -> Memory:
 
 def into_learner(model: BaseAlgorithm, memory: Memory) -> None:
     """Put back what ``of_learner`` told of a learner that was built alike; its ``learn`` may then go on."""
-    model.policy.load_state_dict(_to_tensors(memory.under("policy")))
+    model.policy.load_state_dict(to_tensors(memory.under("policy")))
     for name, optimizer in _optimizers(model).items():
-        part = memory.under(name)
-        state = optimizer.state_dict()
-        indices = sorted({int(key.split("/")[0]) for key in part.arrays})
-        state["state"] = {index: _to_tensors(part.under(str(index))) for index in indices}
-        for group, rate in zip(state["param_groups"], part.values["rates"], strict=True):
-            group["lr"] = rate
-        optimizer.load_state_dict(state)
+        into_optimizer(optimizer, memory.under(name))
     for name, tensor in _tensors(model).items():
         with torch.no_grad():
             tensor.copy_(torch.from_numpy(memory.arrays[name]))
@@ -151,18 +147,39 @@ def into_learner(model: BaseAlgorithm, memory: Memory) -> None:
     _into_generators(model, memory.under("generators"))
 
 
-def of_best(best: Best) -> Memory:
-    """The best agent so far."""
-    if best.actor is None:
-        return Memory(values={"left": None, "timesteps": 0})
-    return Memory(_of_tensors(best.actor.state_dict()).arrays, {"left": best.left, "timesteps": best.timesteps})
+def of_optimizer(optimizer: torch.optim.Optimizer) -> Memory:
+    """What an optimiser remembers, and its rates."""
+    state, memory = optimizer.state_dict(), Memory()
+    for index, tensors in state["state"].items():
+        memory.put(str(index), of_tensors(tensors))
+    memory.values["rates"] = [group["lr"] for group in state["param_groups"]]
+    return memory
 
 
-def into_best(best: Best, to_actor: Callable[[], Actor], memory: Memory) -> None:
-    """Put back the best agent so far; ``to_actor`` makes one of its kind."""
-    if memory.values["left"] is not None:
-        best.left, best.timesteps, best.actor = memory.values["left"], memory.values["timesteps"], to_actor()
-        best.actor.load_state_dict(_to_tensors(memory))
+def into_optimizer(optimizer: torch.optim.Optimizer, memory: Memory) -> None:
+    """Put back what ``of_optimizer`` told of an optimiser of like networks."""
+    state = optimizer.state_dict()
+    indices = sorted({int(key.split("/")[0]) for key in memory.arrays})
+    state["state"] = {index: to_tensors(memory.under(str(index))) for index in indices}
+    for group, rate in zip(state["param_groups"], memory.values["rates"], strict=True):
+        group["lr"] = rate
+    optimizer.load_state_dict(state)
+
+
+def of_torch_generators(device: torch.device) -> Memory:
+    """States of torch's global generators: the processor's, and the device's if it is another."""
+    memory = Memory({"processor": torch.get_rng_state().numpy().copy()})
+    if device.type == "cuda":
+        memory.arrays["device"] = torch.cuda.get_rng_state(device).numpy().copy()
+    return memory
+
+
+def into_torch_generators(device: torch.device, memory: Memory) -> None:
+    """Put back what ``of_torch_generators`` told."""
+    states = to_tensors(memory)
+    torch.set_rng_state(states["processor"])
+    if device.type == "cuda":
+        torch.cuda.set_rng_state(states["device"], device)
 
 
 _COUNTERS: Final = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")
@@ -185,27 +202,30 @@ def _tensors(model: BaseAlgorithm) -> dict[str, torch.Tensor]:
     return {} if weight is None else {"log_ent_coef": weight}
 
 
-def _of_tensors(tensors: dict[str, Any]) -> Memory:
-    return Memory({name: tensor.detach().cpu().numpy().copy() for name, tensor in tensors.items()})
+def of_tensors(tensors: Mapping[str, torch.Tensor]) -> Memory:
+    """Tensors by name."""
+    return Memory({name: _to_array(tensor) for name, tensor in tensors.items()})
 
 
-def _to_tensors(memory: Memory) -> dict[str, torch.Tensor]:
+def to_tensors(memory: Memory) -> dict[str, torch.Tensor]:
+    """The tensors of ``of_tensors``, on the processor."""
     return {name: torch.from_numpy(array.copy()) for name, array in memory.arrays.items()}
+
+
+def _to_array(tensor: torch.Tensor) -> np.ndarray[Any, Any]:
+    return tensor.detach().cpu().numpy().copy()
 
 
 def _of_generators(model: BaseAlgorithm) -> Memory:
     # Stable-Baselines3 draws its minibatches from NumPy's global generator.
     _, keys, *rest = np.random.get_state()  # noqa: NPY002
-    return Memory(
-        {"torch": torch.get_rng_state().numpy().copy(), "numpy": np.array(keys)},
-        {
-            "numpy": rest,
-            "actions": model.action_space.np_random.bit_generator.state,
-        },
-    )
+    memory = Memory({"numpy": np.array(keys)}, {"numpy": rest})
+    memory.put("torch", of_torch_generators(model.device))
+    memory.values["actions"] = model.action_space.np_random.bit_generator.state
+    return memory
 
 
 def _into_generators(model: BaseAlgorithm, memory: Memory) -> None:
-    torch.set_rng_state(torch.from_numpy(memory.arrays["torch"].copy()))
+    into_torch_generators(model.device, memory.under("torch"))
     np.random.set_state(("MT19937", memory.arrays["numpy"], *memory.values["numpy"]))  # noqa: NPY002
     model.action_space.np_random.bit_generator.state = memory.values["actions"]

@@ -29,6 +29,15 @@ from agents.learned.tensor_features import TensorFeatures
 from train.learn import ppo
 from train.learn.actor_critic import ActorLatent, CriticLatent, actor_of
 from train.learn.learner import Learner, LearnerSpec
+from train.learn.memory import (
+    Memory,
+    into_optimizer,
+    into_torch_generators,
+    of_optimizer,
+    of_tensors,
+    of_torch_generators,
+    to_tensors,
+)
 from train.learn.rsl_env import TrainingRows
 
 _GROUPS: Final = {"actor": [GROUP], "critic": [GROUP]}
@@ -161,6 +170,23 @@ class RslPPO:
     def to_actor(self) -> Actor:
         """Return the mean action as a plain network of its own, on the processor."""
         return actor_of(self._latent, self._head.state_dict(), squashed=False)
+
+    def memory(self) -> Memory:
+        """Everything that the rest of the learning depends on, between two rollouts."""
+        learner, memory = self._learner, Memory(values={"num_timesteps": self.num_timesteps})
+        memory.put("actor", of_tensors(learner.actor.state_dict()))
+        memory.put("critic", of_tensors(learner.critic.state_dict()))
+        memory.put("optimizer", of_optimizer(learner.optimizer))
+        memory.put("generators", of_torch_generators(self.env.device))
+        return memory
+
+    def recall(self, memory: Memory) -> None:
+        """Put back what ``memory`` told of a learner with the same options; its ``learn`` then goes on."""
+        learner, self.num_timesteps = self._learner, memory.values["num_timesteps"]
+        learner.actor.load_state_dict(to_tensors(memory.under("actor")))
+        learner.critic.load_state_dict(to_tensors(memory.under("critic")))
+        into_optimizer(learner.optimizer, memory.under("optimizer"))
+        into_torch_generators(self.env.device, memory.under("generators"))
 
     def _set_rate(self, rate: float) -> None:
         self._learner.learning_rate = rate

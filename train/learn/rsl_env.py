@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import torch
 from tensordict import TensorDict
 
@@ -9,7 +11,11 @@ from aframe_env import task
 from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
 from agents.learned.interface import shaped
 from agents.learned.tensor_features import TensorFeatures
+from train.learn.memory import Memory, into_object, of_object, of_tensors, to_tensors
 from train.learn.sb3_env import median_reduction
+
+_OWN: Final = ("_present", "_error_sum", "_still_sum")
+"""Tensors of the bridge itself that change from step to step."""
 
 
 class TrainingRows:
@@ -75,3 +81,17 @@ class TrainingRows:
         self._error_sum.zero_()
         self._still_sum.zero_()
         return reduction
+
+    def memory(self) -> Memory:
+        """Everything that the rows' rest depends on."""
+        memory = of_tensors({name: getattr(self, name) for name in _OWN})
+        memory.put("env", of_tensors(self._env.get_state()))
+        memory.put("features", of_object(self._features))
+        return memory
+
+    def recall(self, memory: Memory) -> None:
+        """Put back what ``memory`` told of rows with the same options."""
+        for name in _OWN:
+            setattr(self, name, torch.from_numpy(memory.arrays[name].copy()).to(self.device))
+        self._env.set_state(to_tensors(memory.under("env")))
+        into_object(self._features, memory.under("features"))

@@ -16,7 +16,7 @@ from aframe_env.text import read_json
 from aframe_env.validation import InvalidValue
 from agents.learned.agent import WEIGHTS, load
 from train.evaluate.run import evaluate
-from train.learn.checkpoint import Checkpoints, KeepCheckpoints, Stopped, can_be_kept, stop_by_signal
+from train.learn.checkpoint import FOLDER, Checkpoints, KeepCheckpoints, Stopped, stop_by_signal
 from train.learn.learner import LearnerSpec, Rows
 from train.learn.logs import open_logger, require_logs
 from train.learn.options import LearningOptions
@@ -138,8 +138,17 @@ def _train_one(spec: LearnerSpec, options: LearningOptions, console: Console) ->
     console.print(f"run folder: {folder}")
     if not (opened.taken_up and _learned(folder)):
         if not opened.taken_up:
+            # They would say of what begins now that it is finished.
+            for name in (METRICS, EVALUATED):
+                (folder / name).unlink(missing_ok=True)
             opened.record(options)
-        if status := _learn(spec, options, opened, console):
+        try:
+            status = _learn(spec, options, opened, console)
+        except OSError as error:
+            if any((folder / FOLDER).glob("[0-9]*")):
+                raise OSError(f"{error}; the last checkpoint is kept, and --resume {folder} goes on from it") from error
+            raise
+        if status:
             return status
     if options.eval_scenarios:
         evaluate(load(folder), folder, options.held_out, console)
@@ -154,10 +163,10 @@ def _learn(spec: LearnerSpec, options: LearningOptions, opened: Run, console: Co
         learner.rows.reset()
     model = learner.model
     begun, card = 0, None
-    if not opened.taken_up:
-        checkpoints.remove()
-    elif can_be_kept(learner):
+    if opened.taken_up:
         card = checkpoints.take_up(learner)
+    else:
+        checkpoints.remove()
     if card is not None:
         begun = model.num_timesteps
         console.print(f"goes on from {begun:,} control steps")
@@ -210,8 +219,7 @@ def _learn(spec: LearnerSpec, options: LearningOptions, opened: Run, console: Co
     )
     console.print(f"agent: {folder / WEIGHTS} after {model.num_timesteps:,} steps in {seconds:.0f} s")
     if stopped is not None:
-        what = f"--resume {folder} goes on" if can_be_kept(learner) else "what was learned is kept, and cannot go on"
-        console.print(f"stopped by {stopped}: {what}")
+        console.print(f"stopped by {stopped}: --resume {folder} goes on")
         return stopped.status
     checkpoints.remove()
     return 0

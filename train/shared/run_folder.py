@@ -28,6 +28,7 @@ from train.shared.job_store import JOBS
 from train.shared.jobs import JobsFailed
 
 CONFIG: Final = "config.toml"
+RECORD: Final = "run.json"
 _WHERE_AND_HOW: Final = ("out", "overwrite", "resume", "checkpoint_every", "log", "threads", "workers")
 """Options that do not change what is computed."""
 _LOCKS: Final[dict[Path, int]] = {}
@@ -36,18 +37,37 @@ REPORTED_PACKAGES = ("gymnasium", "stable-baselines3", "torch", "numpy", "scipy"
 
 
 def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
-    """Let ``write`` fill a temporary file beside ``path``, then rename it: all or nothing."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
-    os.close(handle)
-    temporary = Path(name)
+    """Let ``write`` fill a temporary file beside ``path``, then rename it: all or nothing.
+
+    Raises:
+        OSError: The disk is full, or the like; it names ``path``.
+    """
+    with naming(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=path.suffix)
+        os.close(handle)
+        temporary = Path(name)
+        try:
+            write(temporary)
+            temporary.chmod(0o644)
+            temporary.replace(path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+
+
+@contextlib.contextmanager
+def naming(path: Path, *, unless_named: bool = False) -> Iterator[None]:
+    """Let an error of the disk name a file that is written: by itself it names none, or a temporary one.
+
+    ``unless_named``: leave alone what names a file already.
+    """
     try:
-        write(temporary)
-        temporary.chmod(0o644)
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
+        yield
+    except OSError as error:
+        if error.errno is None or (unless_named and error.filename is not None):
+            raise
+        raise OSError(error.errno, os.strerror(error.errno), str(path)) from error
 
 
 def write_text(path: Path, text: str) -> None:
@@ -123,7 +143,7 @@ class Run:
 
     def record(self, options: RunOptions, **more: Any) -> None:
         """Write run.json: the command line, ``more``, and the versions; then config.toml, which ``--config`` reads."""
-        write_json(self.folder / "run.json", {"command": self.command, **more, "versions": versions()})
+        write_json(self.folder / RECORD, {"command": self.command, **more, "versions": versions()})
         write_text(self.folder / CONFIG, to_toml(options))
 
     @property
@@ -160,9 +180,14 @@ def open_run(options: RunOptions, name: str, *, goes_on: bool = False) -> Run:
     folder = options.out or default
     taken_up = goes_on and not options.overwrite and _recorded(folder) == _what_counts(to_mapping(options))
     if not taken_up:
-        new_folder(folder, overwrite=options.overwrite)
+        new_folder(folder, overwrite=options.overwrite or _hardly_begun(folder))
     _lock(folder)
     return Run(folder, command_line(name), taken_up)
+
+
+def _hardly_begun(folder: Path) -> bool:
+    """Whether a run of this folder was killed before it was recorded; nothing was computed then."""
+    return folder.is_dir() and all(path.name == RECORD or path.name.startswith(".run.") for path in folder.iterdir())
 
 
 def _recorded(folder: Path) -> dict[str, Any] | None:

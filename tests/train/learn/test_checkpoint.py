@@ -18,31 +18,36 @@ from rich.console import Console
 
 from aframe_env.validation import InvalidValue
 from agents.learned.agent import load
-from train.learn import checkpoint, ppo, ppo_predictive, sac
+from train.learn import checkpoint
 from train.learn.checkpoint import ARRAYS, CARD, FOLDER, SEGMENTS, Checkpoints
 from train.learn.learner import LearnerSpec
+from train.learn.registry import find_learner
 from train.learn.run import main, train
 
 Start = Callable[..., subprocess.Popen[str]]
 PPO = {"n_envs": 3, "n_steps": 8, "batch_size": 12, "n_epochs": 2, "horizon": 2.0}
 SAC = {"n_envs": 3, "learning_starts": 12, "replay": 30, "batch_size": 8, "horizon": 2.0}
-CASES: dict[str, tuple[LearnerSpec, dict[str, Any]]] = {
-    "ppo": (ppo.SPEC, {**PPO, "selected_by": 2}),
-    "ppo on sensors": (ppo.SPEC, {**PPO, "observation": "sensors"}),
+CASES: dict[str, tuple[str, dict[str, Any]]] = {
+    "ppo": ("ppo", {**PPO, "selected_by": 2}),
+    "ppo on sensors": ("ppo", {**PPO, "observation": "sensors"}),
     "ppo, predictive, on sensors": (
-        ppo_predictive.SPEC,
+        "ppo-predictive",
         {**PPO, "observation": "sensors", "practice": 0, "selected_by": 0, "critic_first": 2},
     ),
-    "ppo, predictive": (ppo_predictive.SPEC, {**PPO, "practice": 4, "selected_by": 0, "horizon": 4.0}),
-    "sac": (sac.SPEC, SAC),
-    "sac on sensors, speed": (sac.SPEC, {**SAC, "observation": "sensors", "action": "speed", "n_steps": 2}),
+    "ppo, predictive": ("ppo-predictive", {**PPO, "practice": 4, "selected_by": 0, "horizon": 4.0}),
+    "ppo of rsl_rl": ("ppo-rsl", {**PPO, "device": "cpu", "drift_limit": 0.5, "selected_by": 2}),
+    "sac": ("sac", SAC),
+    "sac on sensors, speed": ("sac", {**SAC, "observation": "sensors", "action": "speed", "n_steps": 2}),
 }
 STEPS = 120
 QUIET = Console(quiet=True)
 
 
 def options_of(case: str, out: Path, **more: Any) -> tuple[LearnerSpec, Any]:
-    spec, few = CASES[case]
+    name, few = CASES[case]
+    if name == "ppo-rsl":
+        pytest.importorskip("rsl_rl", reason='rsl-rl-lib is not installed (extra "cuda")')
+    spec = find_learner(name)
     return spec, spec.options(**{**few, "timesteps": STEPS, "eval_scenarios": 0, "out": out, "log": (), **more})
 
 
@@ -149,6 +154,17 @@ def test_what_was_begun_with_overwrite_is_not_overwritten_by_resume(
     monkeypatch.setattr(sys, "argv", ["train.ppo", "--resume", str(tmp_path)])
     assert main("ppo") == 0
     assert "goes on from 48 control steps" in capsys.readouterr().out
+
+
+def test_what_overwrites_a_finished_training_goes_on_as_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    spec, options = options_of("ppo", tmp_path / "whole", gamma=0.9)
+    assert train(spec, options, QUIET) == 0
+    spec, options = options_of("ppo", tmp_path / "parts")
+    assert train(spec, options, QUIET) == 0
+    spec, options = stopped_after(2, "ppo", tmp_path / "parts", monkeypatch, gamma=0.9, overwrite=True)
+    (tmp_path / "parts" / "metrics.json").unlink()  # as if it had been killed
+    assert train(spec, replace(options, overwrite=False), QUIET) == 0
+    assert agent(tmp_path / "parts") == agent(tmp_path / "whole")
 
 
 def test_other_options_are_not_taken_for_the_same_training(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,7 +3,16 @@ import json
 import pytest
 
 from aframe_env import InvalidValue
-from train.shared.run_folder import new_file, new_folder, user_errors, write_atomically, write_json, write_text
+from train.shared.run_folder import (
+    RunOptions,
+    new_file,
+    new_folder,
+    open_run,
+    user_errors,
+    write_atomically,
+    write_json,
+    write_text,
+)
 
 
 def test_a_write_that_fails_keeps_the_old_file_and_leaves_nothing_else(tmp_path):
@@ -14,7 +23,7 @@ def test_a_write_that_fails_keeps_the_old_file_and_leaves_nothing_else(tmp_path)
         temporary.write_text("half")
         raise OSError(28, "No space left on device")
 
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(OSError, match=r"No space left on device: '.*/result\.json'$"):
         write_atomically(path, full_disk)
     assert [p.name for p in tmp_path.iterdir()] == ["result.json"]
     assert path.read_text() == "old"
@@ -49,6 +58,17 @@ def test_folders(tmp_path):
     assert new_folder(folder, overwrite=True) == folder
     with pytest.raises(InvalidValue, match="is a file"):
         new_folder(folder / "x")
+
+
+def test_a_run_that_was_killed_before_it_was_recorded_begins_anew(tmp_path):
+    options = RunOptions(out=tmp_path / "run")
+    options.out.mkdir()
+    (options.out / "run.json").write_text("{}")
+    (options.out / ".run.1abc.json").write_text("{")
+    assert not open_run(options, "train.drives", goes_on=True).taken_up
+    (options.out / "mine").write_text("mine")
+    with pytest.raises(InvalidValue, match="exists and is not empty"):
+        open_run(options, "train.drives", goes_on=True)
 
 
 def test_files(tmp_path):
