@@ -324,7 +324,7 @@ def _from_module(text: str, module: str, attribute: str) -> PolicySpec:
             found = getattr(imported, attribute)
     finally:
         sys.path.remove(here)
-    source = inspect.getsourcefile(imported)
+    source = getattr(imported, "__file__", None)  # a built-in module has none
     digest = _digest(Path(source)) if source else ""
     if isinstance(found, type) or not _is_policy(found):
         if not callable(found):

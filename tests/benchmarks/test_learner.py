@@ -25,6 +25,7 @@ def test_a_learner_is_looked_at_from_the_start_and_given_up_at_the_limit(setup):
     outcome = learner.learn(setup, few, learner.Course("sensors", 2), target=1.1, limit=1e-3)
     assert not outcome.reached
     assert outcome.seconds > 1e-3
-    assert outcome.timesteps == 18
+    # A step of both rows after the first rollout, or in it already where a millisecond is gone by then.
+    assert outcome.timesteps in (2, 18)
     assert len(outcome.reductions) == 1
     assert 0.0 < outcome.environment < 1.0
