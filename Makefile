@@ -36,7 +36,7 @@ verify: .venv/installed
 results: .venv/installed-test
 	$(BIN)/python -m train.ppo --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/ppo
 	$(BIN)/python -m train.ppo --observation sensors --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/ppo-sensors
-	$(BIN)/python -m train.ppo --action predictive --learning-rate 3e-4 --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/predictive-ppo
+	$(BIN)/python -m train.ppo --action predictive --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/predictive-ppo
 	$(BIN)/python -m train.ppo --action predictive --observation sensors --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/predictive-ppo-sensors
 	$(BIN)/python -m train.sac --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/sac
 	$(BIN)/python -m train.sac --observation sensors --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/sac-sensors

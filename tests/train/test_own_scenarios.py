@@ -82,7 +82,20 @@ def test_a_period_of_ones_own_is_compared_at_it(tmp_path, monkeypatch, capsys):
 
 def test_optimisers_and_sensitivity_on_ones_own(own, tmp_path, monkeypatch):
     out = tmp_path / "optimisers"
-    few = ("--count", 1, "--max-evaluations", 60, "--workers", 1, "--out", out)
+    few = (
+        "--count",
+        1,
+        "--max-evaluations",
+        60,
+        "--limited",
+        1,
+        "--limited-evaluations",
+        2,
+        "--workers",
+        1,
+        "--out",
+        out,
+    )
     assert command(monkeypatch, "train.optimisers", "--scenarios", own, *few) == 0
     mine = [row for row in json.loads((out / "comparison.json").read_text()) if row["search"]["scenario"] == 0]
     assert len(mine) == 4

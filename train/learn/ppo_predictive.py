@@ -26,7 +26,7 @@ class Options(ppo.Options):
     """Rows of the environment."""
     n_steps: int = 64
     """Steps of each row between two updates."""
-    learning_rate: float = 1e-3
+    learning_rate: float = 3e-4
     """At the start; it falls linearly to a thirtieth."""
     gamma: float = 0.97
     """Discount for a control step: a horizon of three seconds."""
