@@ -189,19 +189,14 @@ def _learn(spec: LearnerSpec, options: LearningOptions, opened: Run, console: Co
     ):
         model.set_logger(logger)
         keep = KeepCheckpoints(checkpoints, learner, options.checkpoint_every, stop)
-        callbacks: list[BaseCallback] = [ShowReduction(progress, options.timesteps, learner.rows), keep]
-        if options.selected_by:
-            # Before the checkpoints, which keep what it finds.
-            callbacks.insert(0, select := KeepBest(learner, options))
+        # Before the checkpoints, which keep what it finds.
+        select = [KeepBest(learner, options)] if options.selected_by else []
+        callback = CallbackList([*select, ShowReduction(progress, options.timesteps, learner.rows), keep])
         try:
             if isinstance(model, BaseAlgorithm):
-                model.learn(
-                    options.timesteps - begun, callback=CallbackList(callbacks), reset_num_timesteps=card is None
-                )
+                model.learn(options.timesteps - begun, callback=callback, reset_num_timesteps=card is None)
             else:
-                model.learn(options.timesteps, callback=CallbackList(callbacks))
-            if options.selected_by:
-                select.look()
+                model.learn(options.timesteps, callback=callback)
         except Stopped as signalled:
             stopped = signalled
     seconds = time.perf_counter() - begin

@@ -47,10 +47,12 @@ class KeepBest(BaseCallback):
         look = self.num_timesteps // self._every
         if look != self._looked:
             self._looked = look
-            self.look()
+            self._look()
 
-    def look(self) -> None:
-        """Look at the agent as it is."""
+    def _on_training_end(self) -> None:
+        self._look()
+
+    def _look(self) -> None:
         policy: LearnedPolicy = to_policy(self._learner, self._options)[0]
         left = float(np.mean(run(policy, self._scenarios, self._options.config).rms / self._still))
         self.logger.record("selection/heave_left", left)
