@@ -101,22 +101,26 @@ def step_rope_and_load(row: Array, frame: Array, table: Array, index: int, lanes
         row[at.DRUM_SPEED * lanes + j] = speed if active else row[at.DRUM_SPEED * lanes + j]
         row[(at.WINCH + 4) * lanes + j] = error if active else error0
         row[at.TENSION * lanes + j] = force if active else row[at.TENSION * lanes + j]
-        add_cost(row, x.z, v.z, z.z, u.z, h if active else 0.0, lanes, j)
+        if active:
+            add_cost(row, x.z, v.z, z.z, u.z, h, lanes, j)
 
 
 @scalar
 def add_cost(row: Array, z0: float, v0: float, z1: float, v1: float, h: float, lanes: int, j: int) -> None:
-    """Add an inner step of length h [s] to Ω1, Ω2 and the rope's peak: Simpson's rule, the middle on the cubic."""
+    """Add an inner step of length h [s] to Ω1, Ω2 and the rope's peak: Simpson's rule, the middle on the cubic.
+
+    Only for a lane that has made the step: what another felt before, at its start too, is no step's tension.
+    """
     target = row[at.TARGET * lanes + j]
     e0, e1, middle = z0 - target, z1 - target, 0.5 * (z0 + z1) + 0.125 * h * (v0 - v1) - target
     row[at.STEP_COST * lanes + j] += h / 6.0 * (e0 * e0 + 4.0 * middle * middle + e1 * e1)
-    deviation = abs(e1) if h > 0.0 else 0.0
-    row[at.OMEGA2 * lanes + j] = deviation if deviation > row[at.OMEGA2 * lanes + j] else row[at.OMEGA2 * lanes + j]
-    force, peak = row[at.TENSION * lanes + j], row[at.PEAK_TENSION * lanes + j]
-    row[at.PEAK_TENSION * lanes + j] = force if force > peak else peak
-    row[at.SLACK * lanes + j] = 1.0 if force <= 0.0 else row[at.SLACK * lanes + j]
-    parted = force > row[at.BREAKING_LOAD * lanes + j]
-    row[at.PARTED * lanes + j] = 1.0 if parted else row[at.PARTED * lanes + j]
+    row[at.OMEGA2 * lanes + j] = max(row[at.OMEGA2 * lanes + j], abs(e1))
+    force = row[at.TENSION * lanes + j]
+    row[at.PEAK_TENSION * lanes + j] = max(row[at.PEAK_TENSION * lanes + j], force)
+    if force <= 0.0:
+        row[at.SLACK * lanes + j] = 1.0
+    if force > row[at.BREAKING_LOAD * lanes + j]:
+        row[at.PARTED * lanes + j] = 1.0
 
 
 @scalar
