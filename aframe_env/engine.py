@@ -45,7 +45,7 @@ def timing(scenario: Scenario, control_period: float, max_inner_step: float | No
     """Divide a control period [s] for a scenario: the stiffer the rope, the finer the inner step."""
     segments = math.ceil(control_period / MAX_SEGMENT - 1e-9)
     segment = control_period / segments
-    longest = max_inner_step or longest_inner_step(scenario.rope_frequency)
+    longest = max_inner_step or longest_inner_step(scenario.rope_frequency, scenario.rope_damping_rate)
     return Timing(segments, segment, inner_steps(segment, longest))
 
 

@@ -98,13 +98,15 @@ def require_instance(name: str, value: Any, kind: type) -> None:
         raise InvalidValue(f"{name} = {shown(value)}: must be a {kind.__name__}")
 
 
-def require_vector(name: str, value: Any, unit: str, size: int = 3) -> None:
-    """Raise unless ``value`` is a sequence of ``size`` finite numbers."""
+def require_vector(
+    name: str, value: Any, unit: str, size: int = 3, *, low: float = -math.inf, high: float = math.inf
+) -> None:
+    """Raise unless ``value`` is a sequence of ``size`` finite numbers in [low, high]."""
     listed = isinstance(value, Sequence) or (isinstance(value, np.ndarray) and value.ndim == 1)
     if not listed or len(value) != size:
         raise InvalidValue(f"{name} = {shown(value)}: must be {size} numbers in {unit}")
     for index, item in enumerate(value):
-        require_number(f"{name}[{index}]", item, unit)
+        require_number(f"{name}[{index}]", item, unit, low=low, high=high)
 
 
 def require_numbers(name: str, value: Any, unit: str) -> npt.NDArray[np.float64]:

@@ -107,14 +107,17 @@ def draw_lift(row: FloatArray, lanes: int, j: int, seed: int, first: int, ranges
     axial_stiffness = row[at.AXIAL_STIFFNESS * lanes + j]
     length = _free_length(rope_length, row[at.DRUM_TO_PULLEY * lanes + j], mass * GRAVITY, axial_stiffness)
     stiffness = axial_stiffness / length
-    longest = limits[_INNER_STEP] if limits[_INNER_STEP] > 0.0 else _longest_inner_step(math.sqrt(stiffness / mass))
+    damping = ratio * _critical_damping(stiffness, mass)
+    longest = limits[_INNER_STEP]
+    if longest <= 0.0:
+        longest = _longest_inner_step(math.sqrt(stiffness / mass), damping / mass)
     _write_lift(
         row,
         lanes,
         j,
         mass,
         row[(at.PULLEY_ON_DECK + 2) * lanes + j] - rope_length,
-        ratio * _critical_damping(stiffness, mass),
+        damping,
         length,
         limits[_LEAST_LENGTH],
         limits[_MOST_LENGTH],

@@ -15,6 +15,8 @@ MAX_INNER_STEP: Final = 0.02
 INNER_STEP_PHASE: Final = 0.1
 """Greatest phase of the load's bobbing on the rope in one inner step, rad: RK4's phase error is then below 1e-6
 of the angle turned."""
+INNER_STEP_DECAY: Final = 1.0
+"""Greatest decay of the load's bobbing by an overdamped rope in one inner step; RK4 is stable up to 2.78."""
 
 
 def free_length(rope_length: float, drum_to_pulley: float, weight: float, axial_stiffness: float) -> float:
@@ -30,9 +32,13 @@ def critical_damping(stiffness: float, mass: float) -> float:
     return 2.0 * math.sqrt(stiffness * mass)
 
 
-def longest_inner_step(rope_frequency: float) -> float:
-    """Longest inner step [s] for a load that bobs on its rope at ``rope_frequency`` rad/s."""
-    return min(MAX_INNER_STEP, INNER_STEP_PHASE / rope_frequency)
+def longest_inner_step(rope_frequency: float, damping_rate: float) -> float:
+    """Longest inner step [s] for a load that bobs on its rope at ``rope_frequency`` rad/s.
+
+    ``damping_rate``: the rope's damping for each kilogram of load, 1/s; above five times critical it is what counts.
+    """
+    longest = min(MAX_INNER_STEP, INNER_STEP_PHASE / rope_frequency)
+    return INNER_STEP_DECAY / damping_rate if damping_rate * longest > INNER_STEP_DECAY else longest
 
 
 def inner_steps(segment: float, longest: float) -> int:

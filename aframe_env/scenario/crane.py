@@ -39,11 +39,11 @@ class Frame:
     """Material, sections and servomotors (the full model alone reads them)."""
 
     def __post_init__(self) -> None:
-        require_number("half_width", self.half_width, "m", low=0.0, low_open=True)
-        require_number("height", self.height, "m", low=0.0, low_open=True)
+        require_number("half_width", self.half_width, "m", low=0.01, high=1e3)
+        require_number("height", self.height, "m", low=0.01, high=1e3)
         require_number("luffing_angle", self.luffing_angle, "rad", low=-1.4, high=1.4)
-        require_number("servomotor_height", self.servomotor_height, "m", low=0.0, high=self.height, low_open=True)
-        require_number("servomotor_deck_x", self.servomotor_deck_x, "m")
+        require_number("servomotor_height", self.servomotor_height, "m", low=1e-3, high=self.height)
+        require_number("servomotor_deck_x", self.servomotor_deck_x, "m", low=-1e4, high=1e4)
         require_instance("structure", self.structure, FrameStructure)
 
 
@@ -57,8 +57,8 @@ class Rope:
     """Tension at which the rope parts, N. Default: 0.356 d² R with d = 70 mm, R = 1960 N/mm² (EN 12385-4)."""
 
     def __post_init__(self) -> None:
-        require_number("axial_stiffness", self.axial_stiffness, "N", low=0.0, low_open=True)
-        require_number("breaking_load", self.breaking_load, "N", low=0.0, low_open=True)
+        require_number("axial_stiffness", self.axial_stiffness, "N", low=1.0, high=1e12)
+        require_number("breaking_load", self.breaking_load, "N", low=1.0, high=1e12)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,12 +79,12 @@ class Winch:
     """Rope on the drum: greatest unstretched length between drum and load, m."""
 
     def __post_init__(self) -> None:
-        require_number("drum_diameter", self.drum_diameter, "m", low=0.0, low_open=True)
-        require_number("max_rope_speed", self.max_rope_speed, "m/s", low=0.0, low_open=True)
-        require_number("max_rope_acceleration", self.max_rope_acceleration, "m/s²", low=0.0, low_open=True)
-        require_number("lag", self.lag, "s", low=0.0)
-        require_number("min_rope_length", self.min_rope_length, "m", low=0.0, low_open=True)
-        require_number("max_rope_length", self.max_rope_length, "m", low=self.min_rope_length, low_open=True)
+        require_number("drum_diameter", self.drum_diameter, "m", low=1e-3, high=1e3)
+        require_number("max_rope_speed", self.max_rope_speed, "m/s", low=1e-6, high=1e3)
+        require_number("max_rope_acceleration", self.max_rope_acceleration, "m/s²", low=1e-6, high=1e6)
+        require_number("lag", self.lag, "s", low=0.0, high=1e4)
+        require_number("min_rope_length", self.min_rope_length, "m", low=1e-3, high=1e5)
+        require_number("max_rope_length", self.max_rope_length, "m", low=self.min_rope_length, high=1e5, low_open=True)
 
     @property
     def drum_radius(self) -> float:
@@ -116,9 +116,9 @@ class Crane:
         require_instance("frame", self.frame, Frame)
         require_instance("rope", self.rope, Rope)
         require_instance("winch", self.winch, Winch)
-        require_vector("drum_position", self.drum_position, "m")
-        if self.drum_to_pulley == 0.0:
-            raise InvalidValue(f"drum_position = {self.drum_position} m: must not be the pulley's place")
+        require_vector("drum_position", self.drum_position, "m", low=-1e4, high=1e4)
+        if self.drum_to_pulley < 1e-3:
+            raise InvalidValue(f"drum_position = {self.drum_position} m: must not be the pulley's place, within 1 mm")
 
     @cached_property
     def pulley_position(self) -> Vector:

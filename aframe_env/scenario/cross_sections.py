@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, fields
-from typing import NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 from aframe_env.validation import InvalidValue, require_instance, require_number, require_vector, shown
 
@@ -28,6 +28,10 @@ class StressPoint(NamedTuple):
     """Shear stress for a unit shear force V3, 1/m²."""
     torsion: float
     """Shear stress for a unit torque, 1/m³."""
+
+
+_MOMENT: Final = ("m⁴", 1e-12, 1e6)
+"""Unit and range of a second moment."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,12 +52,12 @@ class Material:
     """R_e, Pa, which the utilisation of a stress refers to; the default is that of S355."""
 
     def __post_init__(self) -> None:
-        require_number("young_modulus", self.young_modulus, "Pa", low=0.0, low_open=True)
-        require_number("shear_modulus", self.shear_modulus, "Pa", low=0.0, low_open=True)
-        require_number("density", self.density, "kg/m³", low=0.0, low_open=True)
-        require_number("normal_damping", self.normal_damping, "Pa s", low=0.0)
-        require_number("tangential_damping", self.tangential_damping, "Pa s", low=0.0)
-        require_number("yield_strength", self.yield_strength, "Pa", low=0.0, low_open=True)
+        require_number("young_modulus", self.young_modulus, "Pa", low=1e6, high=1e16)
+        require_number("shear_modulus", self.shear_modulus, "Pa", low=1e6, high=1e16)
+        require_number("density", self.density, "kg/m³", low=1.0, high=1e6)
+        require_number("normal_damping", self.normal_damping, "Pa s", low=0.0, high=1e12)
+        require_number("tangential_damping", self.tangential_damping, "Pa s", low=0.0, high=1e12)
+        require_number("yield_strength", self.yield_strength, "Pa", low=1e3, high=1e12)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,14 +85,18 @@ class GivenSection:
         for item in fields(self):
             if item.name in ("polar_moment", "stress_points"):
                 continue
-            unit = {"area": "m²", "shear_factor_2": "", "shear_factor_3": ""}.get(item.name, "m⁴")
-            low = 1.0 if item.name.startswith("shear_factor") else 0.0
-            require_number(item.name, getattr(self, item.name), unit, low=low, low_open=low == 0.0)
+            unit, low, high = {
+                "area": ("m²", 1e-6, 1e3),
+                "shear_factor_2": ("", 1.0, 1e3),
+                "shear_factor_3": ("", 1.0, 1e3),
+            }.get(item.name, _MOMENT)
+            require_number(item.name, getattr(self, item.name), unit, low=low, high=high)
         if self.polar_moment is not None:
-            require_number("polar_moment", self.polar_moment, "m⁴", low=0.0, low_open=True)
+            unit, low, high = _MOMENT
+            require_number("polar_moment", self.polar_moment, unit, low=low, high=high)
         require_instance("stress_points", self.stress_points, tuple)
         for index, point in enumerate(self.stress_points):
-            require_vector(f"stress_points[{index}]", point, "m, m, 1/m², 1/m² and 1/m³", size=5)
+            require_vector(f"stress_points[{index}]", point, "m, m, 1/m², 1/m² and 1/m³", size=5, low=-1e12, high=1e12)
 
     @property
     def rotary_moment(self) -> float:
@@ -102,7 +110,7 @@ class GivenSection:
 
 def _positive(**lengths: float) -> None:
     for name, value in lengths.items():
-        require_number(name, value, "m", low=0.0, low_open=True)
+        require_number(name, value, "m", low=1e-3, high=100.0)
 
 
 def _flow_energy(constant: float, wall: float, length: float) -> float:
@@ -335,9 +343,9 @@ class Servomotor:
     """Axial damping, N s/m; only with a stiffness."""
 
     def __post_init__(self) -> None:
-        require_number("damping", self.damping, "N s/m", low=0.0)
+        require_number("damping", self.damping, "N s/m", low=0.0, high=1e12)
         if self.stiffness is not None:
-            require_number("stiffness", self.stiffness, "N/m", low=0.0, low_open=True)
+            require_number("stiffness", self.stiffness, "N/m", low=1.0, high=1e14)
         elif self.damping:
             raise InvalidValue(f"damping = {self.damping} N s/m: a rigid servomotor (stiffness None) has none")
 

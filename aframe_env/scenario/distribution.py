@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal
@@ -11,7 +12,7 @@ import numpy as np
 from aframe_env.dynamics.start import critical_damping
 from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
-from aframe_env.scenario.scenario import Scenario
+from aframe_env.scenario.scenario import LEAST_MASS, Scenario
 from aframe_env.scenario.sea import FULL_TURN, Sea, SeaMotion, dnv_gamma
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.scenario.vessel import Vessel
@@ -92,7 +93,7 @@ class ScenarioDistribution:
         elif self.gamma != "dnv":
             raise InvalidValue(f"gamma = {shown(self.gamma)}: must be 'dnv', a number or a tuple in [1, 10]")
         require_number("ramp", self.ramp, "s", low=0.0, high=1e4)
-        _require_range("load_mass", self.load_mass, "kg", 0.0, 1e7, low_open=True)
+        _require_range("load_mass", self.load_mass, "kg", LEAST_MASS, 1e7)
         _require_range("rope_length", self.rope_length, "m", 0.0, 1e5, low_open=True)
         _require_range("rope_damping_ratio", self.rope_damping_ratio, "of critical", 0.0, 1.0)
         require_integer("components", self.components, low=1, high=4096)
@@ -102,8 +103,8 @@ class ScenarioDistribution:
         self._require_records()
         self._require_rope()
         # The corners of the distribution must be scenarios: refuse now rather than in the middle of a run.
-        for u in (0.0, 1.0):
-            self._build(np.full(SUBSTREAM, u), np.full(SUBSTREAM, u), np.full(SUBSTREAM, u))
+        for load, rope in itertools.product((0.0, 1.0), repeat=2):
+            self._build(np.full(SUBSTREAM, load), np.full(SUBSTREAM, load), np.full(SUBSTREAM, rope))
 
     def _require_records(self) -> None:
         """Raise where a record is none, or shorter than the stretch that is drawn from it, or a sea is given beside."""

@@ -125,7 +125,7 @@ class Harmonic:
             high=math.pi if angular else 100.0,
         )
         require_number("period", self.period, "s", low=1.0, high=1e6)
-        require_number("phase", self.phase, "rad")
+        require_number("phase", self.phase, "rad", low=-1e6, high=1e6)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.scenario.motion import HarmonicMotion, ShipMotion, has_components, is_tabled
@@ -13,6 +13,12 @@ from aframe_env.validation import InvalidValue, require_choice, require_instance
 
 Initial = Literal["comoving", "rest"]
 INITIALS: tuple[str, ...] = ("comoving", "rest")
+LEAST_MASS: Final = 1e-3
+"""Least mass of a load, kg."""
+FASTEST_BOBBING: Final = 1e4
+"""Greatest angular frequency of a load bobbing on its rope, rad/s: the inner step follows it."""
+FASTEST_DECAY: Final = 1e6
+"""Greatest damping of a rope for each kilogram of load, 1/s: the inner step follows it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,12 +44,12 @@ class Scenario:
         require_instance("crane", self.crane, Crane)
         if not (has_components(self.motion) or is_tabled(self.motion)):
             raise InvalidValue(f"motion = {shown(self.motion)}: must be a ship motion (HarmonicMotion, SeaMotion, ...)")
-        require_number("load_mass", self.load_mass, "kg", low=0.0, high=1e7, low_open=True)
-        require_number("target_level", self.target_level, "m")
+        require_number("load_mass", self.load_mass, "kg", low=LEAST_MASS, high=1e7)
+        require_number("target_level", self.target_level, "m", low=-1e5, high=1e5)
         require_number("rope_damping", self.rope_damping, "N s/m", low=0.0, high=1e8)
         require_choice("initial", self.initial, INITIALS)
         require_number("ramp", self.ramp, "s", low=0.0, high=1e4)
-        require_number("gravity", self.gravity, "m/s²", low=0.0, high=100.0, low_open=True)
+        require_number("gravity", self.gravity, "m/s²", low=1e-3, high=100.0)
         least, most = self.crane.winch.min_rope_length, self.crane.winch.max_rope_length
         pulley = self.crane.pulley_position[2]
         if self.target_level >= pulley:
@@ -60,6 +66,17 @@ class Scenario:
             raise InvalidValue(
                 f"target_level = {self.target_level!r} m needs {self.free_length:g} m of unstretched rope between "
                 f"drum and load: must be in ({least:g}, {most:g}) m, the winch's limits"
+            )
+        if self.rope_frequency > FASTEST_BOBBING:
+            lightest = self.rope_stiffness / FASTEST_BOBBING**2
+            raise InvalidValue(
+                f"load_mass = {self.load_mass!r} kg bobs on its rope of {self.rope_stiffness:g} N/m at "
+                f"{self.rope_frequency:g} rad/s: must be at least {lightest:g} kg, for {FASTEST_BOBBING:g} rad/s"
+            )
+        if self.rope_damping_rate > FASTEST_DECAY:
+            raise InvalidValue(
+                f"rope_damping = {self.rope_damping!r} N s/m: must be in [0, {FASTEST_DECAY * self.load_mass:g}] N s/m "
+                f"with a load of {self.load_mass:g} kg"
             )
 
     @classmethod
@@ -94,3 +111,8 @@ class Scenario:
     def rope_frequency(self) -> float:
         """Angular frequency of the load bobbing on the rope, rad/s."""
         return math.sqrt(self.rope_stiffness / self.load_mass)
+
+    @property
+    def rope_damping_rate(self) -> float:
+        """d_R / m_L, 1/s."""
+        return self.rope_damping / self.load_mass

@@ -203,7 +203,6 @@ def _shape_grid() -> FloatArray:
 
 def _shape(x: npt.ArrayLike, gamma: float) -> FloatArray:
     """JONSWAP's shape over x = ω/ω_p: the density with Hs = 4 m and ω_p = 1 rad/s, DNV-RP-C205, 3.5.5."""
-    # waveresponse has it too, but importing that takes longer than all else that a first reset does.
     x = np.asarray(x, dtype=np.float64)
     positive = np.where(x > 0.0, x, 1.0)
     width = np.where(positive <= 1.0, 0.07, 0.09)
@@ -230,11 +229,9 @@ def direction_quantiles(spreading: int | None) -> FloatArray:
     """Quantiles of the direction about the mean, rad: (_QUANTILES,)."""
     if spreading is None:
         return np.zeros(_QUANTILES)
-    from waveresponse import CosineFullSpreading
-
     grid = np.linspace(-math.pi, math.pi, 4001)
-    spread = CosineFullSpreading(spreading)
-    return _inverse(grid, np.array([float(spread(1.0, angle)) for angle in grid]))
+    # Up to a factor, which overflows in gamma functions where the spreading is narrow.
+    return _inverse(grid, np.cos(0.5 * grid) ** (2 * spreading))
 
 
 class _SeaKernels(NamedTuple):

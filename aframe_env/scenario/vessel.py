@@ -61,8 +61,8 @@ class Vessel:
     """The file that it was read from, if it was."""
 
     def __post_init__(self) -> None:
-        require_vector("reference_point", self.reference_point, "m")
-        require_vector("deck_position", self.deck_position, "m")
+        require_vector("reference_point", self.reference_point, "m", low=-1e4, high=1e4)
+        require_vector("deck_position", self.deck_position, "m", low=-1e4, high=1e4)
         shape = (len(self.frequencies), len(self.headings), 6)
         if self.response.shape != shape:
             raise InvalidValue(f"response of shape {self.response.shape}: must be {shape}")

@@ -70,7 +70,7 @@ def test_von_mises_of_bending_and_of_torsion():
     [
         (lambda: RectangularHollow(side_2=0.6, side_3=1.0, wall=0.3), "wall.*0.3.*m"),
         (lambda: Tube(diameter=1.0, wall=0.6), "wall"),
-        (lambda: Material(young_modulus=-1.0), r"young_modulus.*\(0, inf\) Pa"),
+        (lambda: Material(young_modulus=-1.0), r"young_modulus.*\[1e\+06, 1e\+16\] Pa"),
         (lambda: Servomotor(damping=1.0), "rigid"),
         (lambda: FrameStructure(leg_section=()), "leg_section"),
         (

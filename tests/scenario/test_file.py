@@ -97,7 +97,7 @@ def test_what_no_file_holds_can_not_be_written():
         ("load_mas = 1", "unknown key 'load_mas'"),
         ("load_mass = 'a'", "[load_mass] 'a': must be a number"),
         ("load_mass = true", "[load_mass] True: must be a number"),
-        ("load_mass = -1", "load_mass = -1.0 kg: must be in (0, 1e+07] kg"),
+        ("load_mass = -1", "load_mass = -1.0 kg: must be in [0.001, 1e+07] kg"),
         ("target_level = 50", "target_level = 50.0 m: must be below the pulley"),
         ("[crane.winch]\nmax_rope_speed = true", "[crane.winch.max_rope_speed] True: must be a number"),
         ("[crane]\ndrum_position = [1, 2]", "[crane.drum_position]"),

@@ -10,10 +10,10 @@ import numpy.typing as npt
 import pytest
 from scipy.integrate import simpson
 from scipy.interpolate import RegularGridInterpolator
-from waveresponse import JONSWAP
+from waveresponse import JONSWAP, CosineFullSpreading
 
 from aframe_env import ScenarioDistribution, Sea, SeaBeyondTableWarning, SeaMotion, Vessel
-from aframe_env.scenario.sea import dnv_gamma
+from aframe_env.scenario.sea import direction_quantiles, dnv_gamma
 
 FloatArray = npt.NDArray[np.float64]
 SUPPLY = Vessel.supply()
@@ -248,3 +248,16 @@ def test_a_distribution_beyond_the_table_is_told_once() -> None:
             source.draw(rng)
     assert len({str(each.message) for each in caught}) == 1
     assert len(caught) < 4
+
+
+def test_the_narrowest_spreading_is_nearly_normal() -> None:
+    # cos^2s(θ/2) goes to exp(-s θ²/4), whose variance is 2/s.
+    quantiles = direction_quantiles(100)
+    assert np.std(quantiles) == pytest.approx(np.sqrt(2.0 / 100.0), rel=0.01)
+    expected = CosineFullSpreading(20)
+    grid = np.linspace(-np.pi, np.pi, 20001)
+    density = np.array([expected(1.0, angle) for angle in grid])
+    below = np.cumsum(density) / density.sum()
+    middle = np.array([0.05, 0.2, 0.5, 0.9])
+    found = np.interp(middle, np.linspace(0.0, 1.0, len(quantiles)), direction_quantiles(20))
+    np.testing.assert_allclose(found, np.interp(middle, below, grid), atol=1e-3)

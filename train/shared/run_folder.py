@@ -33,7 +33,7 @@ _WHERE_AND_HOW: Final = ("out", "overwrite", "resume", "checkpoint_every", "log"
 """Options that do not change what is computed."""
 _LOCKS: Final[dict[Path, int]] = {}
 """Handles of the folders that this process has locked."""
-REPORTED_PACKAGES = ("gymnasium", "stable-baselines3", "torch", "numpy", "scipy", "numba", "waveresponse")
+REPORTED_PACKAGES = ("gymnasium", "stable-baselines3", "torch", "numpy", "scipy", "numba")
 
 
 def write_atomically(path: Path, write: Callable[[Path], object]) -> None:

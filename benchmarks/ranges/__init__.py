@@ -1,0 +1,1 @@
+"""Every documented range, swept to its ends: ``python -m benchmarks.ranges``."""
