@@ -229,7 +229,9 @@ def direction_quantiles(spreading: int | None) -> FloatArray:
     """Quantiles of the direction about the mean, rad: (_QUANTILES,)."""
     if spreading is None:
         return np.zeros(_QUANTILES)
-    grid = np.linspace(-math.pi, math.pi, 4001)
+    # As wide as the density is a millionth of its peak: the outermost quantiles would lie opposite to the waves else.
+    width = 2.0 * math.acos(1e-6 ** (0.5 / spreading))
+    grid = np.linspace(-width, width, 4001)
     # Up to a factor, which overflows in gamma functions where the spreading is narrow.
     return _inverse(grid, np.cos(0.5 * grid) ** (2 * spreading))
 
