@@ -1,14 +1,17 @@
-"""What tests of several packages share: a browser, and processes that end with their test."""
+"""What tests of several packages share: a browser, and processes that end with their test, or are killed in it."""
 
 from __future__ import annotations
 
 import os
 import shutil
 import signal
+import sqlite3
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -77,3 +80,60 @@ def interrupt() -> Callable[[subprocess.Popen[str], Callable[[], object]], str]:
         return process.communicate(timeout=60.0)[1]
 
     return press
+
+
+@pytest.fixture
+def jobs_in() -> Callable[[Path], int]:
+    """Count the finished jobs in a store; -1 if there is none yet."""
+
+    def count(store: Path) -> int:
+        if not store.exists():
+            return -1
+        with closing(sqlite3.connect(store, timeout=60.0)) as database:
+            try:
+                return int(database.execute("SELECT COUNT(*) FROM results").fetchone()[0])
+            except sqlite3.OperationalError:  # the table is not there yet
+                return -1
+
+    return count
+
+
+@pytest.fixture
+def run_module(start: Callable[..., subprocess.Popen[str]]) -> Callable[..., str]:
+    """Run ``python -m`` to its end, which must be a good one; return what it says on standard error."""
+
+    def ended(module: str, *arguments: object, **options: Any) -> str:
+        process = start(_line(module, arguments), env=_environment(), stdout=subprocess.DEVNULL, stderr=-1, **options)
+        said = process.communicate(timeout=300.0)[1]
+        assert process.returncode == 0, said
+        return said
+
+    return ended
+
+
+@pytest.fixture
+def kill_module(start: Callable[..., subprocess.Popen[str]], jobs_in: Callable[[Path], int]) -> Callable[..., int]:
+    """Run ``python -m`` until its store has so many jobs, and kill it (-9); return how many it has then."""
+
+    def killed(store: Path, jobs: int, module: str, *arguments: object, **options: Any) -> int:
+        # Python's own resource tracker remarks on the kill.
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        process = start(_line(module, arguments), env=_environment(), **quiet, **options)
+        until = time.monotonic() + 300.0
+        while jobs_in(store) < jobs and time.monotonic() < until and process.poll() is None:
+            time.sleep(0.02)
+        os.kill(process.pid, signal.SIGKILL)
+        assert process.wait(timeout=60.0) == -signal.SIGKILL
+        kept = jobs_in(store)
+        assert kept >= jobs
+        return kept
+
+    return killed
+
+
+def _line(module: str, arguments: tuple[object, ...]) -> list[str]:
+    return [sys.executable, "-m", module, *map(str, arguments)]
+
+
+def _environment() -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}

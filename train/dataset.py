@@ -8,9 +8,11 @@ none of these seeds draws a held-out scenario.
 
 from __future__ import annotations
 
+import io
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -37,7 +39,7 @@ from agents.registry import BuildContext, PolicySpec, as_spec, choose, slug
 from train.evaluate.run import observation_of
 from train.shared.cli import parse
 from train.shared.console import PlainConsole
-from train.shared.run_folder import command_line, user_errors
+from train.shared.run_folder import command_line, naming, user_errors, write_json
 
 if TYPE_CHECKING:
     from minari.data_collector import EpisodeBuffer
@@ -94,6 +96,45 @@ class Options:
         require_integer("seed", self.seed, low=0, high=MOST_SERIES)
         if not (self.kinds and self.observations):
             raise InvalidValue("kinds, observations: at least one of each, as in --kinds expert --observations state")
+
+
+class PatientFile(io.FileIO):
+    """A file that HDF5 can always write and close; what went wrong is raised when it is done.
+
+    HDF5 cannot close a file that it cannot write: it prints tracebacks, tries again, and may crash.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, "r+")
+        self._error: OSError | KeyboardInterrupt | None = None
+
+    def write(self, data: Any) -> int:
+        """Write bytes, or let them go once the disk is full."""
+        left = memoryview(data)
+        try:
+            while self._error is None and left.nbytes:
+                left = left[super().write(left) :]
+        except (OSError, KeyboardInterrupt) as error:
+            self._error = error
+        return len(data)
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the file's size in bytes, or let it be once the disk is full."""
+        try:
+            if self._error is None:
+                return super().truncate(size)
+        except (OSError, KeyboardInterrupt) as error:
+            self._error = error
+        return size or 0
+
+    @contextmanager
+    def errors(self) -> Iterator[None]:
+        """Raise what went wrong with the file in here, at the end, in place of what HDF5 makes of it."""
+        try:
+            yield
+        finally:
+            if self._error is not None:
+                raise self._error
 
 
 @dataclass(frozen=True)
@@ -261,14 +302,15 @@ def description(recipe: Recipe, policy: Policy, command: str) -> str:
 def make(recipe: Recipe, options: Options, command: str, console: Console) -> None:
     """Make a set, all or nothing, and say what is in it."""
     from minari.dataset.minari_storage import MinariStorage
-    from minari.namespace import create_namespace, list_local_namespaces
+    from minari.namespace import NAMESPACE_METADATA_FILENAME, list_local_namespaces
     from minari.storage import get_dataset_path
 
     seeds = episode_seeds(options.seed, options.episodes)
     env = gymnasium.make(ENV_ID, config=recipe.config)
-    root = get_dataset_path()
+    root, place = get_dataset_path(), get_dataset_path(recipe.id)
+    metadata: list[dict[str, float]] = []
     # Minari passes hidden folders over. This one lies on the disk that the set is to lie on.
-    with TemporaryDirectory(prefix=f".{NAMESPACE}-", dir=root) as folder, _bar(console) as progress:
+    with naming(place), TemporaryDirectory(prefix=f".{NAMESPACE}-", dir=root) as folder, _bar(console) as progress:
         new = Path(folder) / "new"
         new.mkdir()
         storage = MinariStorage.new(
@@ -278,12 +320,16 @@ def make(recipe: Recipe, options: Options, command: str, console: Console) -> No
             env_spec=env.spec,
         )
         bar = progress.add_task(recipe.id, total=recipe.config.steps * -(-len(seeds) // _ROWS))
-        metadata: list[dict[str, float]] = []
-        for policy, episodes, still in collected(recipe, seeds, lambda: progress.advance(bar)):
-            storage.update_episodes(each.buffer(len(metadata) + k) for k, each in enumerate(episodes))
-            algorithm, said = policy.name, description(recipe, policy, command)
-            metadata += [_scores(each, left) for each, left in zip(episodes, still.tolist(), strict=True)]
-        storage.update_episode_metadata(metadata)
+        with PatientFile(new / "data" / "main_data.hdf5") as file:
+            # Minari hands h5py whatever stands here, and that takes a file as well as its path.
+            storage._file_path = file
+            for policy, episodes, still in collected(recipe, seeds, lambda: progress.advance(bar)):
+                with file.errors():
+                    storage.update_episodes(each.buffer(len(metadata) + k) for k, each in enumerate(episodes))
+                algorithm, said = policy.name, description(recipe, policy, command)
+                metadata += [_scores(each, left) for each, left in zip(episodes, still.tolist(), strict=True)]
+            with file.errors():
+                storage.update_episode_metadata(metadata)
         storage.update_metadata(
             {
                 "dataset_id": recipe.id,
@@ -296,8 +342,9 @@ def make(recipe: Recipe, options: Options, command: str, console: Console) -> No
             }
         )
         if NAMESPACE not in list_local_namespaces():
-            create_namespace(NAMESPACE, "Active heave compensation under an offshore A-frame crane")
-        place = get_dataset_path(recipe.id)
+            # Minari's own function leaves half a file on a full disk.
+            about = {"description": "Active heave compensation under an offshore A-frame crane"}
+            write_json(get_dataset_path(NAMESPACE) / NAMESPACE_METADATA_FILENAME, about)
         if place.exists():
             place.rename(Path(folder) / "replaced")
         new.rename(place)

@@ -128,7 +128,7 @@ class Filled:
     def _run(self, disk: Disk, limit: int | None, *, anew: bool = False) -> tuple[int | None, str]:
         said = disk.folder.parent / "said"
         said.write_bytes(b"")
-        overwrite = ("--overwrite",) if anew and self.module != "train.tune" else ()
+        overwrite = ("--overwrite",) if anew else ()
         environment = {"MINARI_DATASETS_PATH": str(disk.folder)}
         arguments = (*shlex.split(_COMMANDS[self.module].replace("DISK", str(disk.folder))), *overwrite)
         process = start(said, self.module, *arguments, environment=environment, largest_file=limit)

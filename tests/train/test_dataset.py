@@ -176,6 +176,23 @@ def test_an_interrupted_set_leaves_nothing(
     assert minari.list_local_datasets() == {}
 
 
+@pytest.mark.skipif(os.name == "nt", reason="needs a limit of each file's size")
+@pytest.mark.parametrize("most", [40, 3000, 60_000])
+def test_a_full_disk_is_one_line_and_leaves_nothing(root: Path, most: int) -> None:
+    (before,) = made(kinds=("medium",), observations=("state",), episodes=1)
+    code = (
+        "import resource, runpy, sys\n"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, resource.RLIM_INFINITY))\n"
+        "runpy.run_module('train.dataset', run_name='__main__', alter_sys=True)"
+    )
+    line = [sys.executable, "-c", code, *command("--episodes", "3", "--overwrite")[3:]]
+    done = subprocess.run(line, capture_output=True, text=True)
+    place = root / "aframe-heave" / "state-medium-v0"
+    assert (done.returncode, done.stderr) == (2, f"error: [Errno 27] File too large: {str(place)!r}\n")
+    assert [path.name for path in root.iterdir()] == ["aframe-heave"]
+    assert minari.load_dataset(before.id).total_episodes == 1
+
+
 def test_without_the_extra_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dataset, "find_spec", lambda name: None)
     with pytest.raises(Exception, match=r"pip install 'aframe-heave\[data\]'"):

@@ -6,6 +6,8 @@ import json
 import pytest
 
 from train.shared.job_store import JobStore
+from train.verify import __main__ as verify
+from train.verify import frame_checks
 
 COMMANDS = {
     "train.tune_control": ("--policies", "state", "inverse-dynamics", "--scenarios", "2", "--evaluations", "4"),
@@ -17,7 +19,18 @@ COMMANDS = {
         *("--scenarios", "0", "--max-evaluations", "50", "--limited", "1", "--limited-evaluations", "2"),
         *("--workers", "1"),
     ),
+    "train.drives.__main__": (
+        *("--case", "paper", "--drive", "harmonic", "--objective", "omega1", "--duration", "6"),
+        *("--max-evaluations", "40", "--check", "rfem"),
+    ),
+    "train.verify.__main__": (),
 }
+FOLDER = {"train.verify.__main__": "--folder"}
+MEASURED = {
+    "train.optimisers": ("comparison.md", "comparison.json"),
+    "train.drives.__main__": ("notes.md", "summary.csv", "summary.json"),
+}
+"""Files that hold seconds, too; of the last, all else is looked at."""
 
 
 class Killed(BaseException):
@@ -27,7 +40,7 @@ class Killed(BaseException):
 def command(name, folder, monkeypatch):
     folder.mkdir(exist_ok=True)
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("sys.argv", [name, *COMMANDS[name], "--out", "out"])
+    monkeypatch.setattr("sys.argv", [name, *COMMANDS[name], FOLDER.get(name, "--out"), "out"])
     return importlib.import_module(name).main()
 
 
@@ -37,18 +50,18 @@ def without_seconds(data):
     return [without_seconds(each) for each in data] if isinstance(data, list) else data
 
 
-def files(folder, *, measured):
-    """What a run wrote; of one that measures seconds, all but those."""
+def files(folder, measured):
+    """What a run wrote, but for the seconds that it measured."""
     found = {path.name: path.read_bytes() for path in (folder / "out").iterdir()}
-    if measured:
-        del found["comparison.md"]
-        found["comparison.json"] = without_seconds(json.loads(found["comparison.json"]))
-    return found
+    data = [without_seconds(json.loads(found[name])) for name in measured[-1:]]
+    return {name: content for name, content in found.items() if name not in measured}, data
 
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_killed_command_goes_on_and_ends_with_the_same_bytes(name, tmp_path, monkeypatch, capsys):
-    pytest.importorskip("SALib", reason="needs the extra sensitivity")
+    if name == "train.sensitivity.__main__":
+        pytest.importorskip("SALib", reason="needs the extra sensitivity")
+    monkeypatch.setattr(verify, "CHECKS", (frame_checks.determinate_reactions, frame_checks.static_frame))
     write, written = JobStore.write, []
 
     def kept(store, key, result):
@@ -68,10 +81,10 @@ def test_a_killed_command_goes_on_and_ends_with_the_same_bytes(name, tmp_path, m
             command(name, tmp_path / "parts", monkeypatch)
     assert command(name, tmp_path / "parts", monkeypatch) == 0
     assert len(set(written)) == len(written) == jobs
-    measured = name == "train.optimisers"
-    whole = files(tmp_path / "whole", measured=measured)
-    assert files(tmp_path / "parts", measured=measured) == whole
-    assert "jobs.sqlite" not in whole
+    measured = MEASURED.get(name, ())
+    whole = files(tmp_path / "whole", measured)
+    assert files(tmp_path / "parts", measured) == whole
+    assert "jobs.sqlite" not in whole[0]
     with pytest.raises(SystemExit):
         command(name, tmp_path / "parts", monkeypatch)
     assert "this run is finished; pass --overwrite to do it again" in capsys.readouterr().err

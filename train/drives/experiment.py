@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from rich.progress import Progress
 
@@ -21,6 +22,7 @@ from agents.drives.optimisation import (
     OPTIMISERS,
     Family,
     ObjectiveName,
+    OptimisedDrive,
     Optimiser,
     optimise,
 )
@@ -28,6 +30,7 @@ from agents.drives.optimisation import Progress as SearchProgress
 from agents.policy import FloatArray
 from train.drives.notes import Variant
 from train.drives.results import Experiment, Result, SummaryRow, Transfer
+from train.shared.job_store import JobStore
 from train.shared.run_folder import RunOptions
 
 STEP = 2.5e-3
@@ -109,8 +112,13 @@ def paper_case(initial: Initial = "rest", damping_ratio: float = PAPER_DAMPING_R
     return replace(scenario, rope_damping=damping_ratio * critical)
 
 
-def solve(scenario: Scenario, options: Options, follow: Callable[[str], SearchProgress | None]) -> Experiment:
-    """Leave the drum still, and find every drive asked for.
+def solve(
+    scenario: Scenario,
+    options: Options,
+    follow: Callable[[str], SearchProgress | None],
+    store: JobStore[OptimisedDrive] | None = None,
+) -> Experiment:
+    """Leave the drum still, and find every drive asked for; ``store`` keeps them.
 
     ``follow`` is called with a drive's label and returns the callback for its search's progress.
     """
@@ -121,19 +129,20 @@ def solve(scenario: Scenario, options: Options, follow: Callable[[str], SearchPr
     results = [Result(row, None, error)]
     for family in options.families:
         for name in options.objectives:
-            found = optimise(
-                family,
-                scenario,
-                name,
-                options.duration,
-                options.intervals,
-                options.harmonics,
-                options.seed,
-                options.max_evaluations,
-                follow(f"{family[0].upper()}-Ω{name[-1]}"),
-                optimiser=options.optimiser,
-                free_start=options.free_start,
-            )
+            search: dict[str, Any] = {
+                "family": family,
+                "scenario": scenario,
+                "objective": name,
+                "duration": options.duration,
+                "intervals": options.intervals,
+                "harmonics": options.harmonics,
+                "seed": options.seed,
+                "max_evaluations": options.max_evaluations,
+                "optimiser": options.optimiser,
+                "free_start": options.free_start,
+            }
+            find = partial(optimise, **search, progress=follow(f"{family[0].upper()}-Ω{name[-1]}"))
+            found = find() if store is None else store.get(search, find)
             row = SummaryRow(
                 family,
                 name,
@@ -148,12 +157,15 @@ def solve(scenario: Scenario, options: Options, follow: Callable[[str], SearchPr
     return Experiment(times, required_angle(objective)[::2], tuple(results))
 
 
-def checked(scenario: Scenario, duration: float, experiment: Experiment, bars: Progress) -> Experiment:
-    """Run every drive in the full model too."""
+def checked(
+    scenario: Scenario, duration: float, experiment: Experiment, bars: Progress, store: JobStore[Transfer]
+) -> Experiment:
+    """Run every drive in the full model too; ``store`` keeps what comes of them."""
     bar = bars.add_task("full model", total=len(experiment.results), unit="runs")
     results = []
     for result in experiment.results:
-        results.append(replace(result, full=transfer(scenario, duration, result)))
+        key = [scenario, duration, result.drive]
+        results.append(replace(result, full=store.get(key, partial(transfer, scenario, duration, result))))
         bars.advance(bar)
     return replace(experiment, results=tuple(results))
 
@@ -178,13 +190,13 @@ def _prescribed(drive: Drive) -> Drum:
     return PrescribedDrum(angle=at(drive.angle), rate=at(drive.speed))
 
 
-def variants(options: Options, bars: Progress) -> list[Variant]:
+def variants(options: Options, bars: Progress, store: JobStore[OptimisedDrive]) -> list[Variant]:
     """Solve the paper's case with other starts and rope dampings, which the paper does not state."""
     found = []
     bar = bars.add_task("other starts and dampings", total=len(VARIANTS), unit="variants")
     for initial, ratio, free in VARIANTS:
         experiment = solve(
-            paper_case(initial, ratio), replace(options, free_start=free, check=None), lambda label: None
+            paper_case(initial, ratio), replace(options, free_start=free, check=None), lambda label: None, store
         )
         found.append(Variant(initial, ratio, free, experiment.results))
         bars.advance(bar)

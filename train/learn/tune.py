@@ -2,35 +2,41 @@
 
 Optuna's tree-structured Parzen estimator, for the greatest median heave reduction over validation scenarios, which are
 neither those of training nor the held-out ones. The first trial is the defaults. Every trial is kept as it ends:
-call again with the same folder to go on after an interruption, or for more trials.
+call again with the same folder to go on after an interruption, or for more trials. The sampler is told of the trials
+that are kept in their order, so that a search that was interrupted ends as one that was not.
 """
 
 from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
 import optuna
-from optuna.storages.journal import JournalFileBackend
 from rich.console import Console
 from rich.progress import Progress
 
+import aframe_env
+import agents
+import train.learn
 from aframe_env.scenario import Scenario, ScenarioSource
-from aframe_env.text import read_toml
 from aframe_env.validation import InvalidValue, require_choice, require_integer
-from agents.policy import DrumStill
+from agents.policy import DrumStill, FloatArray
 from agents.rollout import HELD_OUT_SEED, drawn_scenarios, run
-from train.learn.learner import Search
+from train.learn.learner import LearnerSpec, Search
+from train.learn.options import LearningOptions
 from train.learn.registry import LEARNERS, find_learner
 from train.learn.trained import to_policy
-from train.shared.cli import parse, to_mapping, to_toml
+from train.shared.cli import parse, to_mapping
 from train.shared.console import PlainConsole
+from train.shared.job_store import JobStore, version_of
 from train.shared.markdown import table
-from train.shared.run_folder import command_line, user_errors, versions, write_json, write_text
+from train.shared.run_folder import Run, RunOptions, open_jobs, user_errors, write_text
 from train.shared.scenarios import ScenarioOptions
 
 VALIDATION_SEED: Final = 7_000_001
@@ -38,7 +44,7 @@ VALIDATION_SEED: Final = 7_000_001
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(ScenarioOptions):
+class Options(RunOptions, ScenarioOptions):
     """Learner, and size of the search."""
 
     algorithm: str = "ppo"
@@ -53,7 +59,7 @@ class Options(ScenarioOptions):
     """Number of validation scenarios; or a TOML file with a scenario or a distribution of your own."""
     seed: int = 0
     """Seed of the search; trial k learns with seed + k, so that no seed is tuned for."""
-    out: Path = Path("runs/tune")
+    out: Path | None = Path("runs/tune")
     """Output folder, or that of a search to go on with."""
 
     def __post_init__(self) -> None:
@@ -81,101 +87,141 @@ def suggest(trial: optuna.Trial, space: Search) -> dict[str, Any]:
     return found | {name: trial.suggest_categorical(name, values) for name, values in space.choices.items()}
 
 
-def trials_table(study: optuna.Study, names: list[str]) -> str:
-    """Finished trials as Markdown, the best first."""
-    done = study.get_trials(deepcopy=False, states=(optuna.trial.TrialState.COMPLETE,))
+@dataclass(frozen=True)
+class Score:
+    """What came of a trial."""
+
+    median: float | None
+    """Median heave reduction; None if the trial failed."""
+    fifth: float | None
+    """Heave reduction that 95 % of the scenarios exceed; None if the trial failed."""
+    failure: str = ""
+    """Why it failed."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Hyper-parameters, and what came of them."""
+
+    number: int
+    seed: int
+    parameters: dict[str, Any]
+    score: Score
+
+    @property
+    def cells(self) -> tuple[str, str]:
+        """Median and fifth percentile as text."""
+        median, fifth = self.score.median, self.score.fifth
+        return ("failed", "") if median is None or fifth is None else (f"{median:.2%}", f"{fifth:.2%}")
+
+
+def best_of(trials: Sequence[Trial]) -> Trial:
+    """The trial of the greatest median; ``InvalidValue`` if all have failed."""
+    best = max(trials, key=_median)
+    if best.score.median is None:
+        raise InvalidValue(f"trials = {len(trials)}: all have failed; the first: {trials[0].score.failure}")
+    return best
+
+
+def _median(trial: Trial) -> float:
+    return -np.inf if trial.score.median is None else trial.score.median
+
+
+def trials_table(trials: Sequence[Trial]) -> str:
+    """Trials as Markdown, the best first."""
     lines = []
-    for trial in sorted(done, key=lambda t: -(t.value or 0.0)):
+    for trial in sorted(trials, key=_median, reverse=True):
         which = f"{trial.number}{' (defaults)' if trial.number == 0 else ''}"
-        values = [f"{trial.params[name]:.3g}" for name in names]
-        lines.append([which, f"{trial.value:.2%}", f"{trial.user_attrs['fifth']:.2%}", *values])
-    return table(["trial", "median heave reduction", "fifth percentile", *names], lines)
+        lines.append([which, *trial.cells, *(f"{value:.3g}" for value in trial.parameters.values())])
+    return table(["trial", "median heave reduction", "fifth percentile", *trials[0].parameters], lines)
 
 
-def rows(study: optuna.Study, names: list[str]) -> str:
-    """Finished trials as CSV, in their order."""
+def rows(trials: Sequence[Trial]) -> str:
+    """Trials as CSV, in their order; a failed one has no median."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["trial", "median", "fifth", "seed", *names])
-    for trial in study.get_trials(deepcopy=False, states=(optuna.trial.TrialState.COMPLETE,)):
-        values = [f"{trial.params[name]:.6g}" for name in names]
-        attributes = trial.user_attrs
-        writer.writerow([trial.number, f"{trial.value:.6f}", f"{attributes['fifth']:.6f}", attributes["seed"], *values])
+    writer.writerow(["trial", "median", "fifth", "seed", *trials[0].parameters])
+    for trial in trials:
+        found = ("" if value is None else f"{value:.6f}" for value in (trial.score.median, trial.score.fifth))
+        values = (f"{value:.6g}" for value in trial.parameters.values())
+        writer.writerow([trial.number, *found, trial.seed, *values])
     return text.getvalue()
 
 
-def search(options: Options, console: Console) -> optuna.Study:
-    """Run the trials that are still to be run, and write the tables after each."""
+@dataclass(frozen=True)
+class Judge:
+    """What trials are judged by."""
+
+    spec: LearnerSpec
+    scenarios: Sequence[Scenario]
+    still: FloatArray
+    """RMS depth error of each with the drum still, m."""
+
+    def score(self, options: LearningOptions) -> Score:
+        """Learn with ``options``, and look at the agent."""
+        learner = self.spec.build(options)
+        try:
+            learner.model.learn(options.timesteps)
+            policy, _ = to_policy(learner, options)
+            reduction = 1.0 - run(policy, self.scenarios, options.config).rms / self.still
+        except ValueError as error:  # networks that diverge: what is no number is refused, by whoever sees it first
+            return Score(None, None, " ".join(str(error).split()))
+        if not np.isfinite(reduction).all():
+            return Score(None, None, "the agent's actions are no numbers")
+        return Score(float(np.median(reduction)), float(np.quantile(reduction, 0.05)))
+
+
+def search(options: Options, opened: Run, console: Console) -> list[Trial]:
+    """Run the trials that are not in the store, and write the tables after each."""
     spec = find_learner(options.algorithm)
     assert spec.search is not None
     space, defaults = spec.search, spec.options()
-    names = space.names
     scenarios = validation_scenarios(options.source, options.number)
-    still = run(DrumStill(), scenarios, defaults.config).rms
-    storage = optuna.storages.JournalStorage(JournalFileBackend(str(options.out / "journal.log")))
-    study = optuna.create_study(
-        storage=storage,
-        study_name=f"{options.algorithm}-{options.observation}",
-        direction="maximize",
-        load_if_exists=True,
-    )
-    # A search that goes on must not draw its first trials again.
-    study.sampler = optuna.samplers.TPESampler(seed=options.seed + len(study.trials))
-    if not study.trials:
-        study.enqueue_trial({name: getattr(defaults, name) for name in names})
-
-    def score(trial: optuna.Trial) -> float:
-        changes = suggest(trial, space)
-        seed = options.seed + trial.number
-        timesteps = options.timesteps or defaults.timesteps
-        chosen = replace(
-            defaults,
-            **changes,
-            scenarios=options.scenarios if isinstance(options.scenarios, Path) else None,
-            observation=options.observation,
-            seed=seed,
-            timesteps=timesteps,
-        )
-        learner = spec.build(chosen)
-        learner.model.learn(timesteps)
-        policy, _ = to_policy(learner, chosen)
-        reduction = 1.0 - run(policy, scenarios, chosen.config).rms / still
-        trial.set_user_attr("seed", seed)
-        trial.set_user_attr("fifth", float(np.quantile(reduction, 0.05)))
-        return float(np.median(reduction))
-
-    done = len(study.get_trials(deepcopy=False, states=(optuna.trial.TrialState.COMPLETE,)))
-    with Progress(console=console) as progress:
-        bar = progress.add_task("trials", total=max(options.trials, done), completed=done)
-
-        def ended(study: optuna.Study, trial: optuna.trial.FrozenTrial) -> None:
-            write_text(options.out / "trials.csv", rows(study, names))
-            write_text(options.out / "study.md", trials_table(study, names))
-            console.print(f"trial {trial.number}: {trial.value:.2%}; best {study.best_value:.2%}")
+    judge = Judge(spec, scenarios, run(DrumStill(), scenarios, defaults.config).rms)
+    study = optuna.create_study(direction="maximize", sampler=optuna.samplers.TPESampler(seed=options.seed))
+    study.enqueue_trial({name: getattr(defaults, name) for name in space.names})
+    trials: list[Trial] = []
+    with (
+        Progress(console=console) as progress,
+        JobStore(opened.jobs, Score, version_of(aframe_env, agents, train.learn)) as store,
+    ):
+        bar = progress.add_task("trials", total=options.trials)
+        for number in range(options.trials):
+            asked = study.ask()
+            parameters = suggest(asked, space)
+            chosen = replace(
+                defaults,
+                **parameters,
+                scenarios=options.scenarios if isinstance(options.scenarios, Path) else None,
+                observation=options.observation,
+                seed=options.seed + number,
+                timesteps=options.timesteps or defaults.timesteps,
+            )
+            key = [options.algorithm, to_mapping(chosen), options.source, options.number]
+            score = store.get(key, partial(judge.score, chosen))
+            state = optuna.trial.TrialState.FAIL if score.median is None else optuna.trial.TrialState.COMPLETE
+            study.tell(asked, score.median, state)
+            trials.append(Trial(number, chosen.seed, parameters, score))
+            write_text(opened.folder / "trials.csv", rows(trials))
+            write_text(opened.folder / "study.md", trials_table(trials))
+            console.print(f"trial {number}: {trials[-1].cells[0]} {score.failure}".rstrip())
             progress.advance(bar)
-
-        study.optimize(score, n_trials=max(0, options.trials - done), callbacks=[ended])
-    return study
+    return trials
 
 
 def main() -> int:
     """Run the command."""
     with user_errors():
         options, console = parse(Options, "train.tune", __doc__ or ""), PlainConsole()
-        config = options.out / "config.toml"
-        same = replace(options, trials=1)
-        if config.exists() and not (options.out / "journal.log").exists():
-            raise InvalidValue(f"out = {str(options.out)!r}: holds something else than a search; choose another")
-        if config.exists() and read_toml(config, "config") != to_mapping(same):
-            raise InvalidValue(f"out = {str(options.out)!r}: a search with other options; see its config.toml")
-        options.out.mkdir(parents=True, exist_ok=True)
-        write_text(config, to_toml(same))
-        write_json(options.out / "run.json", {"command": command_line("train.tune"), "versions": versions()})
+        opened = open_jobs(options, "train.tune", "study.md")
+        if opened.taken_up:
+            opened.record(options)  # with the number of trials that is asked for now
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         try:
-            study = search(options, console)
+            best = best_of(search(options, opened, console))
         except KeyboardInterrupt:
-            console.print("interrupted: the trials that ended are kept; call again to go on")
+            console.print("interrupted: the trials that ended are kept; the same command goes on from there")
             return 130
-        console.print(f"best: {study.best_value:.2%} with {study.best_params}; all trials: {options.out / 'study.md'}")
+        table_of_all = opened.folder / "study.md"
+        console.print(f"best: {best.cells[0]} with {best.parameters}; all trials: {table_of_all}", soft_wrap=True)
     return 0

@@ -29,8 +29,8 @@ from train.shared.jobs import JobsFailed
 
 CONFIG: Final = "config.toml"
 RECORD: Final = "run.json"
-_WHERE_AND_HOW: Final = ("out", "overwrite", "resume", "checkpoint_every", "log", "threads", "workers")
-"""Options that do not change what is computed."""
+_WHERE_AND_HOW: Final = ("out", "overwrite", "resume", "checkpoint_every", "log", "threads", "workers", "trials")
+"""Options that do not change what is computed, or only how much."""
 _LOCKS: Final[dict[Path, int]] = {}
 """Handles of the folders that this process has locked."""
 REPORTED_PACKAGES = ("gymnasium", "stable-baselines3", "torch", "numpy", "scipy", "numba")

@@ -22,18 +22,24 @@ import platform
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import scipy
 import tyro
+from rich.console import Console
 
+import aframe_env
+import train.verify
 from aframe_env.text import read_toml
 from aframe_env.validation import InvalidValue
 from train.shared.cli import parse
-from train.shared.run_folder import RunOptions, new_file, open_run, user_errors, write_json, write_text
+from train.shared.console import PlainConsole
+from train.shared.job_store import JobStore, version_of
+from train.shared.run_folder import RunOptions, new_file, open_jobs, user_errors, write_json, write_text
 from train.verify import frame_checks, run_checks
 from train.verify.cases import (
     FORMAT,
@@ -55,32 +61,48 @@ CASE_KINDS: Mapping[str, Callable[[Mapping[str, Any], Path], dict[str, object]]]
 """Functions that run a case, given its file's contents and folder."""
 
 
-def run_all(*, say: bool = True) -> list[Check]:
-    """Run every check, in the order of the table."""
+CHECKS: Sequence[Callable[[], Check | list[Check]]] = (
+    frame_checks.beam_frequencies,
+    frame_checks.determinate_reactions,
+    frame_checks.static_frame,
+    frame_checks.natural_modes,
+    frame_checks.previous_model,
+    run_checks.releases,
+    run_checks.paper_case,
+    run_checks.stiff_frame,
+    run_checks.energy,
+    run_checks.steps,
+    run_checks.drift,
+)
+"""Every check, in the order of the table."""
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What a check found, and how long it took."""
+
+    checks: tuple[Check, ...]
+    seconds: float
+
+
+def run_all(store: JobStore[Checked], console: Console) -> list[Check]:
+    """Run the checks that are not in the store, and return all."""
     checks: list[Check] = []
-    for check in (
-        frame_checks.beam_frequencies,
-        frame_checks.determinate_reactions,
-        frame_checks.static_frame,
-        frame_checks.natural_modes,
-        frame_checks.previous_model,
-        run_checks.releases,
-        run_checks.paper_case,
-        run_checks.stiff_frame,
-        run_checks.energy,
-        run_checks.steps,
-        run_checks.drift,
-    ):
-        begin = time.perf_counter()
-        found = check()
-        found = [found] if isinstance(found, Check) else found
-        checks += found
-        if say:
-            for item in found:
-                mark = "ok  " if item.passed else "FAIL"
-                print(f"{mark} {item.name}: {item.measured} (bar: {item.bar})", flush=True)
-            print(f"     {time.perf_counter() - begin:.1f} s", flush=True)
+    for check in CHECKS:
+        done = store.get([check.__module__, check.__name__], partial(_timed, check))
+        for item in done.checks:
+            mark = "ok  " if item.passed else "FAIL"
+            console.print(f"{mark} {item.name}: {item.measured} (bar: {item.bar})", soft_wrap=True, highlight=False)
+        console.print(f"     {done.seconds:.1f} s", highlight=False)
+        checks += done.checks
     return checks
+
+
+def _timed(check: Callable[[], Check | list[Check]]) -> Checked:
+    begin = time.perf_counter()
+    found = check()
+    every = [found] if isinstance(found, Check) else found
+    return Checked(tuple(replace(each, passed=bool(each.passed)) for each in every), time.perf_counter() - begin)
 
 
 def versions() -> dict[str, str]:
@@ -94,18 +116,15 @@ def write_report(checks: Sequence[Check], folder: Path) -> None:
     stated = ", ".join(f"{name} {version}" for name, version in versions().items())
     images = "\n\n".join(f"![{path.stem.replace('_', ' ')}]({path.name})" for path in pictures)
     footer = f"{images}\n\nMade by `python -m train.verify` ({stated})."
-    write_text(folder / "README.md", markdown(checks, "Verification of the full model", footer))
     write_json(
         folder / "verification.json",
         {
             "command": "python -m train.verify",
             "versions": versions(),
-            "checks": [
-                {**asdict(check), "passed": bool(check.passed), "rows": [asdict(row) for row in check.rows]}
-                for check in checks
-            ],
+            "checks": [{**asdict(check), "rows": [asdict(row) for row in check.rows]} for check in checks],
         },
     )
+    write_text(folder / "README.md", markdown(checks, "Verification of the full model", footer))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,28 +159,34 @@ class Options:
         return {name: path for name, path in given.items() if path is not None}
 
 
-def run_case(kind: str, path: Path, options: Options) -> None:
+def run_case(kind: str, path: Path, options: Options, console: Console) -> None:
     """Run one case, and write or print its result."""
     out = None if options.out is None else new_file(options.out, overwrite=options.overwrite)
     result = without_nan(CASE_KINDS[kind](read_toml(path, kind), path.parent))
     if out is None:
-        print(json.dumps(result, indent=2, allow_nan=False))
+        console.print(json.dumps(result, indent=2, allow_nan=False), soft_wrap=True, highlight=False)
     else:
         write_json(out, result)
-        print(f"result: {out}")
+        console.print(f"result: {out}", soft_wrap=True, highlight=False)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
     with user_errors():
-        options = parse(Options, "train.verify", __doc__ or "", arguments)
+        options, console = parse(Options, "train.verify", __doc__ or "", arguments), PlainConsole()
         for kind, path in options.cases.items():
-            run_case(kind, path, options)
+            run_case(kind, path, options, console)
             return 0
-        run = open_run(RunOptions(out=options.folder, overwrite=options.overwrite), "train.verify")
-        checks = run_all()
-        write_report(checks, run.folder)
-        print(f"written: {run.folder}")
+        run = open_jobs(RunOptions(out=options.folder, overwrite=options.overwrite), "train.verify", "README.md")
+        try:
+            with JobStore(run.jobs, Checked, version_of(aframe_env, train.verify)) as store:
+                checks = run_all(store, console)
+            write_report(checks, run.folder)
+        except KeyboardInterrupt:
+            console.print("interrupted: what is finished is kept; the same command goes on from there")
+            return 130
+        run.finish()
+        console.print(f"written: {run.folder}", soft_wrap=True, highlight=False)
         return 0 if all(check.passed for check in checks) else 1
 
 

@@ -1,11 +1,6 @@
 import hashlib
 import json
-import os
-import signal
 import sqlite3
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
@@ -31,28 +26,8 @@ def arguments(folder):
     return [*axes, *few, "--store", str(folder / "nodes.sqlite"), "--out", str(folder / "out")]
 
 
-def rows(folder):
-    path = folder / "nodes.sqlite"
-    if not path.exists():
-        return 0
-    with sqlite3.connect(path, timeout=60.0) as database:
-        try:
-            return int(database.execute("SELECT COUNT(*) FROM results").fetchone()[0])
-        except sqlite3.OperationalError:  # the table is not there yet
-            return 0
-
-
-def test_a_build_that_is_killed_goes_on_where_it_was(tmp_path, monkeypatch, capsys, start):
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    command = [sys.executable, "-m", "train.drive_map", *arguments(tmp_path)]
-    # Python's own resource tracker remarks on the kill.
-    process = start(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    until = time.monotonic() + 120.0
-    while rows(tmp_path) < 2 and time.monotonic() < until and process.poll() is None:
-        time.sleep(0.02)
-    os.kill(process.pid, signal.SIGKILL)
-    assert process.wait(timeout=60.0) == -signal.SIGKILL
-    kept = rows(tmp_path)
+def test_a_build_that_is_killed_goes_on_where_it_was(tmp_path, monkeypatch, capsys, kill_module, jobs_in):
+    kept = kill_module(tmp_path / "nodes.sqlite", 2, "train.drive_map", *arguments(tmp_path))
     assert 2 <= kept < 24
     # A mark on what was finished shows that it is taken as it is.
     with sqlite3.connect(tmp_path / "nodes.sqlite") as database:
@@ -69,7 +44,7 @@ def test_a_build_that_is_killed_goes_on_where_it_was(tmp_path, monkeypatch, caps
     found = stored.load(tmp_path / "out")
     assert found.shape == (2, 3, 2, 2)
     assert int((found.remaining == 0.125).sum()) == kept
-    assert rows(tmp_path) == 24
+    assert jobs_in(tmp_path / "nodes.sqlite") == 24
     _the_map_is_right(found)
     notes = (tmp_path / "out" / "notes.md").read_text(encoding="utf-8")
     assert "All came from the store." in notes

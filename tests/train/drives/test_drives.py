@@ -132,7 +132,7 @@ def test_ctrl_c_leaves_nothing_half_written(tmp_path, monkeypatch):
     monkeypatch.setattr("train.drives.experiment.optimise", interrupted)
     out = tmp_path / "out"
     assert command(monkeypatch, "--out", out) == 130
-    assert not list(out.iterdir())
+    assert {path.name for path in out.iterdir()} == {"config.toml", "jobs.sqlite", "run.json"}
 
 
 def test_gauss_newton_finds_omega1_and_leaves_omega2_to_nelder_mead(tmp_path, monkeypatch):

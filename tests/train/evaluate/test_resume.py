@@ -1,10 +1,3 @@
-import os
-import signal
-import sqlite3
-import subprocess
-import sys
-import time
-
 import pytest
 
 from agents import rollout
@@ -56,31 +49,9 @@ def test_an_interrupted_comparison_goes_on_and_ends_with_the_same_bytes(tmp_path
     assert "this run is finished; pass --overwrite to do it again" in capsys.readouterr().err
 
 
-def test_a_comparison_that_is_killed_goes_on(tmp_path, start):
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    line = [sys.executable, "-m", "train.evaluate", *COMMAND, "--no-report"]
-    process = start(line, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    until = time.monotonic() + 300.0
-    while kept(tmp_path) < 1 and time.monotonic() < until and process.poll() is None:
-        time.sleep(0.02)
-    os.kill(process.pid, signal.SIGKILL)
-    assert process.wait(timeout=60.0) == -signal.SIGKILL
-    before = kept(tmp_path)
-    again = start(line, cwd=tmp_path, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-    said = again.communicate(timeout=300.0)[1]
-    assert again.returncode == 0, said
-    assert before >= 1
-    assert "warning" not in said
+def test_a_comparison_that_is_killed_goes_on(tmp_path, kill_module, run_module):
+    line = ("train.evaluate", *COMMAND, "--no-report")
+    kill_module(tmp_path / "out" / "jobs.sqlite", 1, *line, cwd=tmp_path)
+    assert "warning" not in run_module(*line, cwd=tmp_path)
     assert {"comparison.json", "comparison.md", "comparison.png"} <= set(files(tmp_path))
     assert "jobs.sqlite" not in files(tmp_path)
-
-
-def kept(folder):
-    path = folder / "out" / "jobs.sqlite"
-    if not path.exists():
-        return 0
-    with sqlite3.connect(path, timeout=60.0) as database:
-        try:
-            return int(database.execute("SELECT COUNT(*) FROM results").fetchone()[0])
-        except sqlite3.OperationalError:  # the table is not there yet
-            return 0

@@ -1,4 +1,6 @@
 import csv
+import os
+from types import SimpleNamespace
 
 import pytest
 
@@ -48,11 +50,67 @@ def test_a_search_goes_on_where_it_ended(tmp_path, monkeypatch):
 def test_another_search_in_the_same_folder_is_refused(tmp_path, monkeypatch, capsys):
     out = tmp_path / "study"
     assert command(monkeypatch, *TINY, "--trials", 1, "--out", out) == 0
-    kept = (out / "journal.log").read_bytes()
+    kept = (out / "jobs.sqlite").read_bytes()
     with pytest.raises(SystemExit):
         command(monkeypatch, "--timesteps", 512, "--scenarios", 3, "--trials", 1, "--out", out)
-    assert "a search with other options" in capsys.readouterr().err
-    assert (out / "journal.log").read_bytes() == kept
+    assert "exists and is not empty; choose another, or pass --overwrite" in capsys.readouterr().err
+    assert (out / "jobs.sqlite").read_bytes() == kept
+    assert command(monkeypatch, "--timesteps", 512, "--scenarios", 3, "--trials", 1, "--out", out, "--overwrite") == 0
+    assert len(trials(out)) == 1
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs SIGKILL")
+def test_a_killed_search_ends_with_the_same_bytes(tmp_path, kill_module, run_module):
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    few = ("train.tune", "--timesteps", 256, "--scenarios", 3, "--trials", 3, "--out")
+    run_module(*few, whole)
+    store = parts / "jobs.sqlite"
+    assert kill_module(store, 0, *few, parts) == 0  # in the first trial
+    assert 1 <= kill_module(store, 1, *few, parts) < 3
+    run_module(*few, parts)
+    assert len(trials(parts)) == 3
+    for name in ("trials.csv", "study.md"):
+        assert (parts / name).read_bytes() == (whole / name).read_bytes()
+
+
+def test_a_trial_that_fails_is_told_of_and_kept(tmp_path, monkeypatch, capsys):
+    spec = find_learner("ppo")
+    learned = []
+
+    def build(options):
+        learner = spec.build(options)
+        if options.seed == 1:
+            for parameter in learner.model.policy.parameters():
+                parameter.data.fill_(float("nan"))
+        learned.append(options.seed)
+        return learner
+
+    def small():
+        return tune.replace(spec.options(), n_envs=32)
+
+    monkeypatch.setattr(tune, "find_learner", lambda name: tune.replace(spec, options=small, build=build))
+    out = tmp_path / "study"
+    for _ in range(2):
+        assert command(monkeypatch, *TINY, "--trials", 3, "--out", out) == 0
+        assert "trial 1: failed" in capsys.readouterr().out
+        assert [trial["median"] == "" for trial in trials(out)] == [False, True, False]
+        assert "| 1 | failed |" in (out / "study.md").read_text().splitlines()[-1]
+    assert learned == [0, 1, 2]
+    assert command(monkeypatch, *TINY, "--trials", 2, "--seed", 1, "--out", tmp_path / "other") == 0
+
+
+def test_a_search_of_failures_alone_says_so(tmp_path, monkeypatch, capsys):
+    spec = find_learner("ppo")
+
+    class Refusing:
+        def learn(self, timesteps):
+            raise ValueError("no number")
+
+    refused = tune.replace(spec, build=lambda options: SimpleNamespace(model=Refusing()))
+    monkeypatch.setattr(tune, "find_learner", lambda name: refused)
+    with pytest.raises(SystemExit):
+        command(monkeypatch, *TINY, "--trials", 1, "--out", tmp_path / "study")
+    assert "error: trials = 1: all have failed; the first: no number" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
