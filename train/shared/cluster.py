@@ -6,6 +6,7 @@ alone decides what is tried again, and it alone writes what comes back.
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import os
 import socket
@@ -13,14 +14,13 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator
 from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from gymnasium.error import DependencyNotInstalled
 
-import aframe_env
-import agents
 from aframe_env.validation import InvalidValue
-from train.shared.job_store import version_of
 from train.shared.local_workers import ONE_THREAD, Failure, Job, Success, died
 
 Item = TypeVar("Item")
@@ -98,10 +98,17 @@ def outcomes(
 
 @cache
 def installed() -> str:
-    """Digest of the sources that are installed here: a worker must have the same."""
-    import train
+    """Digest of the sources that are installed here: a worker must have the same.
 
-    return version_of(aframe_env, agents, train)
+    They are not imported for that: a job may need only a part of them.
+    """
+    digest = hashlib.sha256()
+    for package in ("aframe_env", "agents", "train"):
+        spec = find_spec(package)
+        for folder in (spec and spec.submodule_search_locations) or ():
+            for path in sorted(Path(folder).rglob("*.py")):
+                digest.update(path.read_bytes())
+    return digest.hexdigest()
 
 
 def _carried_work() -> Callable[[str, bytes], tuple[str, Any]]:
