@@ -1,8 +1,10 @@
-"""A study on a Ray cluster whose workers, nodes and driver are killed again and again."""
+"""A sweep on a Ray cluster whose workers, nodes and driver are killed again and again."""
 
 from __future__ import annotations
 
+import sqlite3
 import time
+from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
 from multiprocessing.context import ForkServerProcess
@@ -12,15 +14,15 @@ from typing import Final, Literal
 
 import numpy as np
 
-from agents.drives.map import ARRAYS
 from benchmarks.torture.local_cluster import LocalCluster, local_cluster
 from benchmarks.torture.processes import start
+from benchmarks.torture.sweep import COUNT
 from benchmarks.torture.trial import Outcome, Trial
+from train.shared.job_store import JOBS
 
-_STUDY: Final = "--amplitudes 0.5 1 2 --periods 8 9 10 --masses 4e4 5e4 --lengths 200 300 --held-out 2 --scenarios 2"
-"""Some fifty jobs."""
 _PATIENCE: Final = 300.0
-"""Seconds after which a study is no longer waited for."""
+"""Seconds after which a sweep is no longer waited for."""
+Row = tuple[str, str, str]
 Victim = Literal["worker", "node", "driver"]
 WANTED: Final[dict[Victim, int]] = {"worker": 20, "node": 10, "driver": 5}
 """Kills of each."""
@@ -28,32 +30,34 @@ WANTED: Final[dict[Victim, int]] = {"worker": 20, "node": 10, "driver": 5}
 
 @dataclass(frozen=True)
 class Killed:
-    """``train.drive_map`` on two nodes of one processor each."""
+    """A sweep on two nodes of one processor each."""
 
     victim: Victim
 
     def attempt(self, rng: np.random.Generator, folder: Path, most: int) -> Outcome:
-        """Kill in the middle of jobs, until the study ends or so many were killed; hold its map to the true one."""
+        """Kill in the middle of jobs, until the sweep ends or so many were killed; hold its rows to the true ones."""
         kills = 0
         with local_cluster(2) as cluster:
-            options = ("--cluster", cluster.address)
-            process = self._start(folder, *options)
-            while kills < most and self._wait_for_work(process, cluster):
+            process = self._start(folder, cluster.address)
+            while kills < most and self._wait_for_row(process, folder):
                 process.join(float(rng.uniform(0.0, 1.0)))
                 if not process.is_alive() or not self._kill(process, cluster, rng):
                     continue
                 kills += 1
                 if self.victim == "driver":
-                    process = self._start(folder, *options)
+                    process = self._start(folder, cluster.address)
             process.join(_PATIENCE)
             status = process.exitcode
             process.kill()
             process.join()
         tried = max(kills, 1)
-        if status == 0 and _results(folder) == self._results:
+        rows = _rows(folder)
+        if status == 0 and len(rows) == COUNT and rows == self._truth:
             return Outcome(tried, tried)
         said = (folder / "said").read_text(encoding="utf-8")
-        return Outcome(tried, 0, failures=(f"exit status {status}, or another map: {said[-1000:]}",))
+        return Outcome(
+            tried, 0, failures=(f"exit status {status}, {len(rows & self._truth)} of {COUNT} rows: {said[-1000:]}",)
+        )
 
     def _kill(self, driver: ForkServerProcess, cluster: LocalCluster, rng: np.random.Generator) -> bool:
         """Kill one; return False if there was none at work."""
@@ -71,32 +75,36 @@ class Killed:
         return True
 
     @staticmethod
-    def _wait_for_work(process: ForkServerProcess, cluster: LocalCluster) -> bool:
-        """Wait until a worker is at a job; return False if the study has ended, or nothing comes."""
-        end = time.monotonic() + _PATIENCE
+    def _wait_for_row(process: ForkServerProcess, folder: Path) -> bool:
+        """Wait until one job more is finished; return False if the sweep has ended, or nothing comes."""
+        end, before = time.monotonic() + _PATIENCE, len(_rows(folder))
         while process.is_alive() and time.monotonic() < end:
-            if cluster.working():
+            if len(_rows(folder)) > before:
                 return True
             process.join(0.05)
         return False
 
     @cached_property
-    def _results(self) -> list[bytes]:
-        """Of a study on this machine that nothing befalls."""
+    def _truth(self) -> set[Row]:
+        """Rows of a sweep on this machine that nothing befalls."""
         with TemporaryDirectory(prefix="torture-") as name:
             folder = Path(name)
-            process = self._start(folder, "--workers", 1)
-            process.join(_PATIENCE)
-            return _results(folder)
+            self._start(folder).join(_PATIENCE)
+            return _rows(folder)
 
     @staticmethod
-    def _start(folder: Path, *options: object) -> ForkServerProcess:
-        places = ("--store", folder / "jobs.sqlite", "--out", folder / "run")
-        return start(folder / "said", "train.drive_map", *_STUDY.split(), *places, *options)
+    def _start(folder: Path, *address: str) -> ForkServerProcess:
+        return start(folder / "said", "benchmarks.torture.sweep", folder, *address)
 
 
-def _results(folder: Path) -> list[bytes]:
-    return [(folder / "run" / name).read_bytes() for name in (ARRAYS, "held_out.json")]
+def _rows(folder: Path) -> set[Row]:
+    """Rows of the store."""
+    if not (folder / JOBS).exists():
+        return set()
+    with closing(sqlite3.connect(folder / JOBS, timeout=60.0)) as database:
+        if not database.execute("SELECT 1 FROM sqlite_master").fetchall():
+            return set()
+        return set(database.execute("SELECT key, result, digest FROM results"))
 
 
 def trials() -> list[Trial]:
@@ -104,8 +112,8 @@ def trials() -> list[Trial]:
     return [
         Trial(
             name=f"cluster, {victim} killed",
-            what=f"`train.drive_map --cluster` on two nodes, a {victim} killed (−9) in the middle of jobs: the map is "
-            "that of a study on one machine that nothing befell, to the bit",
+            what=f"a sweep of {COUNT} jobs on two nodes, a {victim} killed (−9) in the middle of jobs: its rows are those "
+            "of a sweep on one machine that nothing befell, to the bit",
             wanted=count,
             attempt=Killed(victim).attempt,
         )

@@ -48,6 +48,8 @@ SMALL = {
 ELSEWHERE = {
     ("scenario-files.md", "toml"): "tests/scenario/test_scenario_docs.py",
     ("scenario-files.md", "csv"): "tests/scenario/test_scenario_docs.py",
+    ("cluster.md", "bash"): "nothing: a script of Slurm's, whose own command is the one that its page says by hand",
+    ("cluster.md", "yaml"): "nothing: KubeRay's, with the same command",
     ("architecture.md", "text"): "the layers, which lint-imports holds",
 }
 """Blocks of other languages than Python and the shell, and what tests them."""
