@@ -112,8 +112,8 @@ def trials() -> list[Trial]:
     return [
         Trial(
             name=f"cluster, {victim} killed",
-            what=f"a sweep of {COUNT} jobs on two nodes, a {victim} killed (−9) in the middle of jobs: its rows are those "
-            "of a sweep on one machine that nothing befell, to the bit",
+            what=f"a sweep of {COUNT} jobs on two nodes, a {victim} killed (−9) in the middle of jobs: its rows are "
+            "those of a sweep on one machine that nothing befell, to the bit",
             wanted=count,
             attempt=Killed(victim).attempt,
         )
