@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from typing import Any, Final
 from unittest import mock
 
+from gymnasium.error import DependencyNotInstalled
+
 _LEAST_STORE: Final = 80 * 2**20
 """Smallest object store of a node that Ray takes, bytes."""
 
@@ -52,8 +54,10 @@ class LocalCluster:
 @contextmanager
 def local_cluster(nodes: int) -> Iterator[LocalCluster]:
     """Start a cluster whose workers find the modules that this process finds; end all its processes."""
-    from ray.cluster_utils import Cluster
-
+    try:
+        from ray.cluster_utils import Cluster
+    except ImportError as error:
+        raise DependencyNotInstalled('ray is not installed: pip install "aframe-heave[cluster]"') from error
     path = os.pathsep.join(filter(None, sys.path))
     with mock.patch.dict(os.environ, RAY_USAGE_STATS_ENABLED="0", PYTHONPATH=path):
         head = {"num_cpus": 0, "object_store_memory": _LEAST_STORE, "include_dashboard": False}
