@@ -32,14 +32,14 @@ from train.drives.experiment import paper_case
 from train.shared.cli import parse
 from train.shared.console import PlainConsole
 from train.shared.job_store import JobStore, version_of
-from train.shared.jobs import run_jobs
+from train.shared.jobs import Where, run_jobs
 from train.shared.markdown import table
 from train.shared.run_folder import RunOptions, open_jobs, user_errors, write_json, write_text
 from train.shared.scenarios import ScenarioOptions
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(RunOptions, ScenarioOptions):
+class Options(RunOptions, Where, ScenarioOptions):
     """Size of the comparison."""
 
     bounds: ClassVar[tuple[int, int]] = (0, 10_000)
@@ -53,11 +53,10 @@ class Options(RunOptions, ScenarioOptions):
     """Number of held-out scenarios of the second part, under the winch's limits."""
     limited_evaluations: int = EVALUATIONS
     """Most evaluations of the objective for each drive of the second part."""
-    workers: int | None = None
-    """Worker processes; by default one for each core."""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        Where.__post_init__(self)
+        ScenarioOptions.__post_init__(self)
         require_integer("max_evaluations", self.max_evaluations, low=1, high=10**9)
         require_integer("first_limited", self.first_limited, low=0, high=10**6)
         require_integer("limited", self.limited, low=0, high=10_000)
@@ -245,7 +244,7 @@ def study_limits(options: Options, jobs: Path, progress: Progress) -> str:
             searches,
             lambda search: [options.source, search],
             store=store,
-            workers=options.workers,
+            where=options,
             progress=progress,
             description="under the winch's limits",
         )
@@ -271,7 +270,7 @@ def main() -> int:
                     searches,
                     lambda search: [options.source, search],
                     store=store,
-                    workers=options.workers,
+                    where=options,
                     progress=progress,
                     description="searches",
                 )

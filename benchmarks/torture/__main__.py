@@ -1,4 +1,4 @@
-"""Try to lose work: kill commands at random moments, fill their disks; count what survives.
+"""Try to lose work: kill commands, and a cluster's workers, at random moments, fill disks; count what survives.
 
 ``python -m benchmarks.torture`` takes some ten minutes and writes results/reliability.json; interrupted, the same
 command goes on where it was. All moments are drawn from --seed; what they hit is up to the machine. Linux and macOS.
@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from aframe_env.validation import require_integer
-from benchmarks.torture import full_disk, kills
+from benchmarks.torture import cluster, full_disk, kills
 from benchmarks.torture.trial import Results, Trial, attempts
 from train.shared.cli import parse
 from train.shared.run_folder import command_line, user_errors
@@ -45,7 +45,7 @@ class Options:
     @property
     def trials(self) -> list[Trial]:
         """What is tried."""
-        everything = [*kills.trials(self.kills), *full_disk.trials(self.full_disks)]
+        everything = [*kills.trials(self.kills), *full_disk.trials(self.full_disks), *cluster.trials()]
         return [trial for trial in everything if self.only in trial.name]
 
 

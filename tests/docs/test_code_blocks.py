@@ -48,6 +48,8 @@ SMALL = {
 ELSEWHERE = {
     ("scenario-files.md", "toml"): "tests/scenario/test_scenario_docs.py",
     ("scenario-files.md", "csv"): "tests/scenario/test_scenario_docs.py",
+    ("cluster.md", "bash"): "test_scripts_for_clusters_are_taken",
+    ("cluster.md", "yaml"): "test_scripts_for_clusters_are_taken",
     ("architecture.md", "text"): "the layers, which lint-imports holds",
 }
 """Blocks of other languages than Python and the shell, and what tests them."""
@@ -198,6 +200,26 @@ def test_commands_within_the_text_are_taken(desk: Path, parsed: Callable[[str], 
     assert found >= OF_RECIPES
     for line in sorted(found - OF_RECIPES):
         parsed(line)
+
+
+def test_scripts_for_clusters_are_taken(desk: Path, parsed: Callable[[str], Any]) -> None:
+    """The shell reads them, and our commands and Ray's take their arguments; there is no Slurm or Kubernetes here."""
+    yaml = pytest.importorskip("yaml", reason="needs PyYAML")
+    start = pytest.importorskip("ray.scripts.scripts", reason="needs the extra cluster").start
+    found = re.findall(r"```(bash|yaml)\n(.*?)```", (ROOT / "docs/cluster.md").read_text("utf-8"), flags=re.DOTALL)
+    assert [language for language, _ in found] == ["bash", "bash", "yaml"]
+    for language, block in found:
+        if language == "yaml":
+            job = yaml.safe_load(block)["spec"]
+            assert set(job["rayClusterSpec"]) == {"headGroupSpec", "workerGroupSpecs"}
+            assert parsed(job["entrypoint"]).cluster == "auto"
+            continue
+        subprocess.run(["bash", "-n"], input=block, text=True, check=True)
+        script = block.replace("\\\n", " ").replace("$SLURM_CPUS_PER_TASK", "64").replace("$address", "10.0.0.1:6379")
+        ours = [parsed(line) for line in re.findall(r"^python .*", script, flags=re.MULTILINE)]
+        assert [options.cluster is not None for options in ours] == [True]
+        rays = re.findall(r"ray start (.*?)(?: &)?$", script, flags=re.MULTILINE)
+        assert [start.make_context("start", shlex.split(line)).params["head"] for line in rays] == [True, False]
 
 
 def evaluate(document: Document) -> int:

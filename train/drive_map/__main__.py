@@ -31,7 +31,7 @@ from train.drive_map.seas import compare_in
 from train.shared.cli import parse
 from train.shared.console import PlainConsole
 from train.shared.job_store import JobStore, version_of
-from train.shared.jobs import run_jobs
+from train.shared.jobs import Where, run_jobs
 from train.shared.run_folder import (
     RunOptions,
     open_jobs,
@@ -45,7 +45,7 @@ from train.shared.scenarios import ScenarioOptions
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(RunOptions, ScenarioOptions):
+class Options(RunOptions, Where, ScenarioOptions):
     """The map's grid, and its tests."""
 
     amplitudes: tuple[float, ...] = (0.25, 0.5, 1.0, 2.0, 4.0)
@@ -64,13 +64,12 @@ class Options(RunOptions, ScenarioOptions):
     whose crane the map is then made for."""
     seed: int = 0
     """Seed of the heaves between the nodes."""
-    workers: int | None = None
-    """Worker processes; by default one for each core."""
     store: Path = Path("runs/drive-map.sqlite")
     """File that keeps finished optimisations."""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        Where.__post_init__(self)
+        ScenarioOptions.__post_init__(self)
         for name, unit, low, high in (
             ("amplitudes", "m", 1e-3, 20.0),
             ("periods", "s", 1.0, 100.0),
@@ -113,9 +112,7 @@ def run(options: Options, console: Console) -> int:
             begin = time.perf_counter()
             with JobStore(options.store, NodeDrive, version) as store:
                 fresh = len(nodes) - len(store.read([store.key(node) for node in nodes]))
-                found = run_jobs(
-                    optimise_node, nodes, store=store, workers=options.workers, progress=bars, description="nodes"
-                )
+                found = run_jobs(optimise_node, nodes, store=store, where=options, progress=bars, description="nodes")
             rate = fresh / (time.perf_counter() - begin)
             drive_map = assemble(options, found)
             between = between_nodes(drive_map, crane, options.held_out, options.seed)
@@ -124,7 +121,7 @@ def run(options: Options, console: Console) -> int:
                     check,
                     between,
                     store=answers,
-                    workers=options.workers,
+                    where=options,
                     progress=bars,
                     description="between the nodes",
                 )
@@ -132,7 +129,7 @@ def run(options: Options, console: Console) -> int:
                 HeldOut(each.optimum, each.ratio_error, each.remaining, where.node)
                 for where, each in zip(between, checked, strict=True)
             ]
-            seas = compare_in(drive_map, opened, options, options.workers, bars)
+            seas = compare_in(drive_map, opened, options, options, bars)
     except KeyboardInterrupt:
         console.print("interrupted: what is finished is kept; the same command goes on from there")
         return 130

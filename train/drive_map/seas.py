@@ -19,6 +19,7 @@ from agents.rollout import held_out_scenarios, run
 from train.evaluate.run import observation_of
 from train.evaluate.statistics import Entry, Row, compare
 from train.evaluate.tables import write_comparison
+from train.shared.jobs import Where
 from train.shared.run_folder import Run
 from train.shared.scenarios import ScenarioOptions
 from train.shared.tuned_drives import tune
@@ -49,14 +50,14 @@ class InSea:
 
 
 def compare_in(
-    drive_map: DriveMap, opened: Run, scenarios: ScenarioOptions, workers: int | None, progress: Progress
+    drive_map: DriveMap, opened: Run, scenarios: ScenarioOptions, where: Where, progress: Progress
 ) -> list[InSea]:
     """Run every policy over held-out scenarios of each kind of sea, and write a folder for each."""
     kinds, config = kinds_of(scenarios.source), TaskConfig(scenario=scenarios.source)
     drawn = {kind: held_out_scenarios(source, scenarios.number) for kind, source in kinds.items()}
     every = [scenario for each in drawn.values() for scenario in each]
     tuned = tune(
-        ("S-Ω1",), every, config.duration, opened.jobs, optimiser="gauss-newton", workers=workers, progress=progress
+        ("S-Ω1",), every, config.duration, opened.jobs, optimiser="gauss-newton", where=where, progress=progress
     )
     sensors = config.replaced(observation="sensors").sensors
     best = iter(tuned["S-Ω1"])

@@ -17,6 +17,7 @@ from agents.registry import choose_all
 from train.evaluate.run import AFTER_TRAINING, HeldOut, require_period, run_all, write
 from train.shared.cli import parse
 from train.shared.console import PlainConsole
+from train.shared.jobs import Where
 from train.shared.run_folder import RunOptions, open_jobs, user_errors
 
 REPORT_PACKAGES = ("jinja2", "plotly", "pyarrow")
@@ -29,7 +30,7 @@ def needed_for_the_report() -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(RunOptions, HeldOut):
+class Options(RunOptions, Where, HeldOut):
     """Policies, and the held-out scenarios that they meet."""
 
     policies: tuple[str, ...] = (
@@ -53,7 +54,8 @@ class Options(RunOptions, HeldOut):
     """Write report.html and episodes.parquet too; by default where the extra "report" is installed."""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        Where.__post_init__(self)
+        HeldOut.__post_init__(self)
         needed = needed_for_the_report()
         if self.report and needed:
             raise InvalidValue(f"report = True: {needed}, or pass --no-report")
@@ -68,7 +70,7 @@ def main() -> int:
         opened = open_jobs(options, "train.evaluate", "comparison.json")
         folder = opened.folder
         try:
-            comparison = run_all(choices, options, console, jobs=opened.jobs)
+            comparison = run_all(choices, options, console, jobs=opened.jobs, where=options)
             write(folder, comparison, console)
             if options.report:
                 # Imported late: they need the extra.

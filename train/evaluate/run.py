@@ -27,7 +27,7 @@ from train.evaluate.figure import comparison_figure
 from train.evaluate.statistics import Entry, Mask, Row, compare, compare_families
 from train.evaluate.tables import rich_table, write_comparison
 from train.shared.job_store import JOBS, JobStore, version_of
-from train.shared.jobs import run_jobs
+from train.shared.jobs import HERE, Where, run_jobs
 from train.shared.scenarios import ScenarioOptions
 
 AFTER_TRAINING: Final = (
@@ -142,11 +142,13 @@ class _Ran:
     episodes: Episodes
 
 
-def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console, *, jobs: Path = IN_MEMORY) -> Comparison:
+def run_all(
+    specs: Sequence[PolicySpec], held_out: HeldOut, console: Console, *, jobs: Path = IN_MEMORY, where: Where = HERE
+) -> Comparison:
     """Run the drum still and every policy that was chosen over the held-out scenarios.
 
     What is finished, each policy's run over a block of scenarios and each drive that one needs, is kept in the file
-    ``jobs``, and not computed again.
+    ``jobs``, and not computed again. Drives are optimised ``where``.
     """
     config = held_out.config
     scenarios = held_out_scenarios(config.source, held_out.number)
@@ -173,7 +175,9 @@ def run_all(specs: Sequence[PolicySpec], held_out: HeldOut, console: Console, *,
             parts = []
             for i, block in enumerate(blocks):
                 identity = [spec.name, spec.digest, config, block.start, len(block)]
-                parts.append(ran.get(identity, partial(_run_block, spec, config, mine, block, drives, progress, bar)))
+                parts.append(
+                    ran.get(identity, partial(_run_block, spec, config, mine, block, drives, where, progress, bar))
+                )
                 progress.update(bar, completed=(i + 1) * config.steps)
             episodes = Episodes.joined([part.episodes for part in parts])
             entries.append(Entry(spec.name, parts[0].knows, episodes, spec.text))
@@ -186,6 +190,7 @@ def _run_block(
     scenarios: Sequence[Scenario],
     block: range,
     drives: JobStore[OptimisedDrive],
+    where: Where,
     progress: Progress,
     bar: TaskID,
 ) -> _Ran:
@@ -194,6 +199,7 @@ def _run_block(
         run_jobs,
         key=lambda scenario: [spec.name, config, scenario],
         store=drives,
+        where=where,
         progress=progress,
         description=f"{spec.name}: preparing",
     )

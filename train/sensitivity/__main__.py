@@ -46,7 +46,7 @@ def main() -> int:
                     options.config.duration,
                     opened.jobs,
                     optimiser=options.optimiser,
-                    workers=options.workers,
+                    where=options,
                     progress=bars,
                 )
                 jobs = [Job(name, tuple(tuned.get(name, ())), still, options) for name in options.policies]
@@ -56,7 +56,7 @@ def main() -> int:
                         jobs,
                         identity,
                         store=store,
-                        workers=options.workers,
+                        where=options,
                         progress=bars,
                         description="policies",
                     )

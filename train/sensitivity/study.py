@@ -22,6 +22,7 @@ from agents.policy import DrumStill, FloatArray, Knowledge, Policy
 from agents.registry import BuildContext, choose
 from agents.rollout import held_out_scenarios, run
 from train.sensitivity.analysis import Sensitivity, analyse
+from train.shared.jobs import Where
 from train.shared.run_folder import RunOptions
 from train.shared.scenarios import ScenarioOptions
 
@@ -29,7 +30,7 @@ STILL, MAP = "drum still", "drive map"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(RunOptions, ScenarioOptions):
+class Options(RunOptions, Where, ScenarioOptions):
     """Policies and scenarios of the study."""
 
     policies: tuple[str, ...] = (
@@ -56,11 +57,10 @@ class Options(RunOptions, ScenarioOptions):
     """Optimiser of the drives for Ω1."""
     seed: int = 0
     """Seed of the Sobol samples."""
-    workers: int | None = None
-    """Worker processes; by default one for each core."""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        Where.__post_init__(self)
+        ScenarioOptions.__post_init__(self)
         if not self.policies or len(set(self.policies)) < len(self.policies):
             raise InvalidValue(f"policies = {self.policies}: must be at least one, each named once")
         require_integer("points", self.points, low=2, high=1001)

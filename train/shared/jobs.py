@@ -1,37 +1,55 @@
-"""``run_jobs``: every sweep's independent jobs over worker processes, resumable after any interruption.
+"""``run_jobs``: every sweep's independent jobs, on this machine or a cluster, resumable after any interruption.
 
-Each worker is an executor of its own, so that one that dies (out of memory, killed) takes only its own job with it
-and is replaced. What is finished is on disk before the next job starts.
+What is finished is on disk before the next job starts.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
-import signal
-import threading
+import re
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
-from typing import Any, Generic, TypeVar
+from typing import Any, Final, TypeVar
 
 from rich.progress import Progress
 
-from aframe_env.validation import require_integer
+from aframe_env.validation import InvalidValue, require_integer
+from train.shared import cluster, local_workers
 from train.shared.job_store import JobStore, NotStored
+from train.shared.local_workers import Failure, Job, Success
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+@dataclass(frozen=True, kw_only=True)
+class Where:
+    """Where the jobs of a sweep run; what comes of them is the same everywhere."""
+
+    workers: int | None = None
+    """Most jobs at once; by default one for each core of this machine, or as many as keep the cluster busy."""
+    cluster: str | None = None
+    """Ray cluster that they run on: "auto" for the one that this machine belongs to, or HOST:PORT of its head; by
+    default they run in processes of this machine."""
+
+    def __post_init__(self) -> None:
+        require_integer("workers", 1 if self.workers is None else self.workers, low=1, high=10**6)
+        if self.cluster is not None and not re.fullmatch(r"auto|[^\s:/]+:[0-9]{1,5}", self.cluster):
+            raise InvalidValue(f"cluster = {self.cluster!r}: must be auto or HOST:PORT, as in 10.0.0.1:6379")
+
+    def outcomes(
+        self, fn: Callable[[Item], Result], jobs: deque[Job[Item]], attempts: int
+    ) -> Generator[tuple[Job[Item], Success[Result] | Failure], None, None]:
+        """Each job with what came of it, in the order of finishing. Closing the iterator ends those that run."""
+        if self.cluster is not None:
+            return cluster.outcomes(fn, jobs, self.cluster, self.workers, attempts)
+        return local_workers.outcomes(fn, jobs, min(self.workers or os.cpu_count() or 1, len(jobs)), attempts)
 
 
-class WorkerDied(RuntimeError):
-    """A worker process ended in the middle of a job, as often as the job was tried."""
+HERE: Final = Where()
+"""One process for each core of this machine."""
 
 
 class JobsFailed(RuntimeError):
@@ -50,12 +68,12 @@ def run_jobs(
     key: Callable[[Item], Any] | None = None,
     *,
     store: JobStore[Result] | None = None,
-    workers: int | None = None,
+    where: Where = HERE,
     attempts: int = 3,
     progress: Progress | None = None,
     description: str = "jobs",
 ) -> list[Result]:
-    """Return ``[fn(item) for item in items]``, computed by ``workers`` processes (by default one for each core).
+    """Return ``[fn(item) for item in items]``, computed ``where`` (by default by one process for each core).
 
     ``fn``, items and results must be picklable. With a ``store``, what it already holds is not computed again and
     each result is kept as soon as it is there: interrupt or kill the process at any moment and call again. ``key``
@@ -64,7 +82,6 @@ def run_jobs(
     cannot be stored for its NaN or infinity, only once; the rest is finished before ``JobsFailed`` reports them.
     """
     require_integer("attempts", attempts, low=1, high=1000)
-    require_integer("workers", 1 if workers is None else workers, low=1, high=4096)
     keys: list[str] = [str(i) for i in range(len(items))]
     found: dict[str, Result] = {}
     if store is not None:
@@ -73,13 +90,14 @@ def run_jobs(
     first: dict[str, int] = {}
     for index, each in enumerate(keys):
         first.setdefault(each, index)
-    jobs = deque(_Job(index, items[index]) for each, index in first.items() if each not in found)
+    jobs = deque(Job(index, items[index]) for each, index in first.items() if each not in found)
     failures: list[tuple[int, Exception]] = []
     with contextlib.ExitStack() as stack:
         bars = stack.enter_context(Progress()) if progress is None else progress
         bar = bars.add_task(description, total=len(first), completed=len(first) - len(jobs))
-        for job, outcome in _outcomes(fn, jobs, min(workers or os.cpu_count() or 1, len(jobs)), attempts):
-            if isinstance(outcome, _Failure):
+        outcomes = stack.enter_context(contextlib.closing(where.outcomes(fn, jobs, attempts)))
+        for job, outcome in outcomes:
+            if isinstance(outcome, Failure):
                 failures.append((job.index, outcome.error))
             else:
                 try:
@@ -92,98 +110,3 @@ def run_jobs(
     if failures:
         raise JobsFailed(sorted(failures, key=lambda failure: failure[0]), len(items))
     return [found[each] for each in keys]
-
-
-@dataclass
-class _Job(Generic[Item]):
-    index: int
-    item: Item
-    tries: int = 0
-
-
-@dataclass(frozen=True)
-class _Success(Generic[Result]):
-    value: Result
-
-
-@dataclass(frozen=True)
-class _Failure:
-    error: Exception
-
-
-def _outcomes(
-    fn: Callable[[Item], Result], jobs: deque[_Job[Item]], workers: int, attempts: int
-) -> Iterator[tuple[_Job[Item], _Success[Result] | _Failure]]:
-    """Each job with what came of it, in the order of finishing. Closing the iterator kills the workers."""
-    running: dict[Future[Result], tuple[_Worker, _Job[Item]]] = {}
-    idle: list[_Worker] = []
-    with _one_thread_each():
-        try:
-            idle += [_Worker() for _ in range(workers)]
-            while jobs or running:
-                while jobs and idle:
-                    worker, job = idle.pop(), jobs.popleft()
-                    job.tries += 1
-                    running[worker.executor.submit(fn, job.item)] = worker, job
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    worker, job = running.pop(future)
-                    try:
-                        outcome: _Success[Result] | _Failure = _Success(future.result())
-                    except BrokenProcessPool:
-                        worker.kill()
-                        worker = _Worker()
-                        if job.tries < attempts:
-                            idle.append(worker)
-                            jobs.append(job)
-                            continue
-                        outcome = _Failure(WorkerDied(f"the worker died in each of {job.tries} attempts"))
-                    except Exception as error:
-                        outcome = _Failure(error)
-                    idle.append(worker)
-                    yield job, outcome
-        finally:
-            for worker in [*idle, *(worker for worker, _ in running.values())]:
-                worker.kill()
-
-
-class _Worker:
-    """One process, behind an executor of its own."""
-
-    def __init__(self) -> None:
-        context = get_context("spawn")
-        ours, self._lifeline = context.Pipe(duplex=False)
-        self._ours = ours
-        self.executor = ProcessPoolExecutor(1, mp_context=context, initializer=_live_on, initargs=(ours,))
-
-    def kill(self) -> None:
-        """End the process at once, whatever it is at."""
-        self._lifeline.close()
-        self.executor.shutdown(wait=True, cancel_futures=True)
-        self._ours.close()
-
-
-def _live_on(lifeline: Connection) -> None:
-    """Make this process end with the other end of its lifeline: closed, or lost with a parent that was killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def watch() -> None:
-        with contextlib.suppress(EOFError, OSError):
-            lifeline.recv()
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
-@contextlib.contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Workers started meanwhile compute with one thread each: there is one of them for each core."""
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value

@@ -29,7 +29,17 @@ from train.shared.jobs import JobsFailed
 
 CONFIG: Final = "config.toml"
 RECORD: Final = "run.json"
-_WHERE_AND_HOW: Final = ("out", "overwrite", "resume", "checkpoint_every", "log", "threads", "workers", "trials")
+_WHERE_AND_HOW: Final = (
+    "out",
+    "overwrite",
+    "resume",
+    "checkpoint_every",
+    "log",
+    "threads",
+    "workers",
+    "cluster",
+    "trials",
+)
 """Options that do not change what is computed, or only how much."""
 _LOCKS: Final[dict[Path, int]] = {}
 """Handles of the folders that this process has locked."""

@@ -13,7 +13,7 @@ from aframe_env.scenario import Scenario
 from agents.drives.optimisation import OptimisedDrive, Optimiser
 from agents.drives.tuned import TUNED, optimised
 from train.shared.job_store import JobStore, version_of
-from train.shared.jobs import run_jobs
+from train.shared.jobs import HERE, Where, run_jobs
 
 
 @dataclass(frozen=True)
@@ -35,14 +35,12 @@ def tune(
     store: Path,
     *,
     optimiser: Optimiser = "nelder-mead",
-    workers: int | None = None,
+    where: Where = HERE,
     progress: Progress | None = None,
 ) -> dict[str, list[OptimisedDrive]]:
     """Drives of those names for each scenario, over ``duration`` s; what is found is kept in the file ``store``."""
     jobs = [_Job(name, scenario, duration, optimiser) for name in names for scenario in scenarios]
     with JobStore(store, OptimisedDrive, version_of(agents)) as drives:
-        found = run_jobs(
-            _solve, jobs, store=drives, workers=workers, progress=progress, description="optimising drives"
-        )
+        found = run_jobs(_solve, jobs, store=drives, where=where, progress=progress, description="optimising drives")
     count = len(scenarios)
     return {name: found[i * count : (i + 1) * count] for i, name in enumerate(names)}

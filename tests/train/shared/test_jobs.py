@@ -13,11 +13,13 @@ import hypothesis
 import numpy as np
 import numpy.typing as npt
 import pytest
+from gymnasium.error import DependencyNotInstalled
 from hypothesis import strategies as st
 
 from aframe_env import InvalidValue
 from train.shared.job_store import JobStore, NotStored
-from train.shared.jobs import JobsFailed, WorkerDied, run_jobs
+from train.shared.jobs import JobsFailed, Where, run_jobs
+from train.shared.local_workers import WorkerDied
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ def computed(folder):
 
 def test_results_come_in_the_order_of_the_items(tmp_path):
     cells = [Cell(n, str(tmp_path)) for n in (3, 1, 2)]
-    assert [s.value for s in run_jobs(squared, cells, workers=2)] == [9, 1, 4]
+    assert [s.value for s in run_jobs(squared, cells, where=Where(workers=2))] == [9, 1, 4]
     assert computed(tmp_path) == [1, 2, 3]
     assert run_jobs(squared, []) == []
 
@@ -85,9 +87,9 @@ def test_results_come_in_the_order_of_the_items(tmp_path):
 def test_a_store_gives_back_what_was_computed_bit_for_bit_and_computes_the_rest(tmp_path):
     cells = [Cell(n, str(tmp_path)) for n in range(4)]
     with store_in(tmp_path) as store:
-        first = run_jobs(squared, cells[:3], store=store, workers=1)
+        first = run_jobs(squared, cells[:3], store=store, where=Where(workers=1))
     with store_in(tmp_path) as store:
-        again = run_jobs(squared, [*cells, cells[0]], store=store, workers=1)
+        again = run_jobs(squared, [*cells, cells[0]], store=store, where=Where(workers=1))
     assert again[:3] == first
     assert again[4] == again[0]
     assert computed(tmp_path) == [0, 1, 2, 3]
@@ -103,33 +105,33 @@ def test_configuration_version_and_type_of_the_result_make_the_key(tmp_path):
 def test_a_key_of_ones_own_decides_what_is_computed_once(tmp_path):
     cells = [Cell(n, str(tmp_path)) for n in (1, 2, -1)]
     with store_in(tmp_path) as store:
-        found = run_jobs(squared, cells, lambda cell: abs(cell.number), store=store, workers=1)
+        found = run_jobs(squared, cells, lambda cell: abs(cell.number), store=store, where=Where(workers=1))
     assert [s.parts[0] for s in found] == pytest.approx([0.1, 0.2, 0.1])
     assert computed(tmp_path) == [1, 2]
 
 
 def test_a_worker_that_dies_is_replaced_and_its_task_tried_again(tmp_path):
     items = [str(tmp_path / "marker0"), str(tmp_path / "marker0")]
-    assert run_jobs(dies_once, items, workers=1, attempts=2) == [1, 1]
+    assert run_jobs(dies_once, items, where=Where(workers=1), attempts=2) == [1, 1]
 
 
 def test_a_task_that_always_kills_its_worker_is_reported_and_the_others_are_done(tmp_path):
     with JobStore(tmp_path / "cells.sqlite", int, "1") as store:
         with pytest.raises(JobsFailed, match=r"1 of 4 jobs failed; the first, job 1: .*2 attempts") as failed:
-            run_jobs(dies, [0, 1, 2, 3], store=store, workers=2, attempts=2)
+            run_jobs(dies, [0, 1, 2, 3], store=store, where=Where(workers=2), attempts=2)
         assert isinstance(failed.value.failures[0][1], WorkerDied)
         assert sorted(store.read([store.key(n) for n in range(4)]).values()) == [0, 2, 3]
 
 
 def test_a_task_that_raises_is_reported_with_its_own_error():
     with pytest.raises(JobsFailed, match="2 of 4 jobs failed") as failed:
-        run_jobs(refuses, [0, 1, 2, 3], workers=1)
+        run_jobs(refuses, [0, 1, 2, 3], where=Where(workers=1))
     assert [(i, str(e)) for i, e in failed.value.failures] == [(1, "1 is odd"), (3, "3 is odd")]
 
 
 def test_workers_compute_with_one_thread_and_leave_the_parent_as_it_was():
     before = dict(os.environ)
-    assert run_jobs(threads, [0], workers=1) == [("1", 1)]
+    assert run_jobs(threads, [0], where=Where(workers=1)) == [("1", 1)]
     assert dict(os.environ) == before
 
 
@@ -137,7 +139,7 @@ SWEEP = """
 import sys, time
 from pathlib import Path
 from train.shared.job_store import JobStore
-from train.shared.jobs import run_jobs
+from train.shared.jobs import Where, run_jobs
 
 def slow(number):
     (Path(sys.argv[1]) / f"begun{number}").touch()
@@ -147,7 +149,7 @@ def slow(number):
 if __name__ == "__main__":
     with JobStore(Path(sys.argv[1]) / "cells.sqlite", int, "1") as store:
         try:
-            run_jobs(slow, range(6), store=store, workers=2)
+            run_jobs(slow, range(6), store=store, where=Where(workers=2))
         except KeyboardInterrupt:
             sys.exit(130)
 """
@@ -191,10 +193,23 @@ def test_a_store_that_is_something_else_is_refused(tmp_path):
         JobStore(path, int, "1")
 
 
-@pytest.mark.parametrize(("name", "value"), [("attempts", 0), ("workers", 0)])
-def test_bad_arguments_are_named(name, value):
-    with pytest.raises(InvalidValue, match=f"{name} = 0: must be in"):
-        run_jobs(squared, [], **{name: value})
+def test_bad_arguments_are_named():
+    with pytest.raises(InvalidValue, match="attempts = 0: must be in"):
+        run_jobs(squared, [], attempts=0)
+    with pytest.raises(InvalidValue, match="workers = 0: must be in"):
+        Where(workers=0)
+
+
+@pytest.mark.parametrize("address", ["", "somewhere", "ray://head:10001", "head:", "a b:1"])
+def test_an_address_that_is_none_is_named(address):
+    with pytest.raises(InvalidValue, match=f"cluster = '{address}': must be auto or HOST:PORT"):
+        Where(cluster=address)
+
+
+def test_a_cluster_needs_its_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(DependencyNotInstalled, match=r'ray is not installed: pip install "aframe-heave\[cluster\]"'):
+        run_jobs(squared, [Cell(1)], where=Where(cluster="auto"))
 
 
 @dataclass(frozen=True)
@@ -233,7 +248,7 @@ def not_finite_if_odd(number):
 def test_a_job_of_which_nan_comes_is_named_and_the_others_are_kept(tmp_path):
     with JobStore(tmp_path / "cells.sqlite", float, "1") as store:
         with pytest.raises(JobsFailed, match=r"1 of 3 jobs failed; the first, job 1: .*NaN"):
-            run_jobs(not_finite_if_odd, [0, 1, 2], store=store, workers=1)
+            run_jobs(not_finite_if_odd, [0, 1, 2], store=store, where=Where(workers=1))
         assert store.read([store.key(n) for n in range(3)]) == {store.key(0): 0.0, store.key(2): 2.0}
 
 
