@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from aframe_env.validation import require_integer
-from benchmarks.torture import cluster, full_disk, kills
+from benchmarks.torture import cluster, full_disk, kills, studies
 from benchmarks.torture.trial import Results, Trial, attempts
 from train.shared.cli import parse
 from train.shared.run_folder import command_line, user_errors
@@ -28,6 +28,8 @@ class Options:
 
     kills: int = 100
     """Kills of each learner's training."""
+    study_kills: int = 20
+    """Kills of each command that keeps its finished jobs."""
     full_disks: int = 5
     """Full disks of each command that writes."""
     only: str = ""
@@ -39,13 +41,19 @@ class Options:
 
     def __post_init__(self) -> None:
         require_integer("kills", self.kills, low=1, high=10**6)
+        require_integer("study_kills", self.study_kills, low=1, high=10**6)
         require_integer("full_disks", self.full_disks, low=1, high=10**6)
         require_integer("seed", self.seed, low=0, high=2**32 - 1)
 
     @property
     def trials(self) -> list[Trial]:
         """What is tried."""
-        everything = [*kills.trials(self.kills), *full_disk.trials(self.full_disks), *cluster.trials()]
+        everything = [
+            *kills.trials(self.kills),
+            *studies.trials(self.study_kills),
+            *full_disk.trials(self.full_disks),
+            *cluster.trials(),
+        ]
         return [trial for trial in everything if self.only in trial.name]
 
 

@@ -1,10 +1,10 @@
 """Commands that are killed between their jobs: the same command goes on, and nothing is lost or done twice."""
 
 import importlib
-import json
 
 import pytest
 
+from benchmarks.torture.studies import MEASURED, contents
 from train.shared.job_store import JobStore
 from train.verify import __main__ as verify
 from train.verify import frame_checks
@@ -26,11 +26,6 @@ COMMANDS = {
     "train.verify.__main__": (),
 }
 FOLDER = {"train.verify.__main__": "--folder"}
-MEASURED = {
-    "train.optimisers": ("comparison.md", "comparison.json"),
-    "train.drives.__main__": ("notes.md", "summary.csv", "summary.json"),
-}
-"""Files that hold seconds, too; of the last, all else is looked at."""
 
 
 class Killed(BaseException):
@@ -42,19 +37,6 @@ def command(name, folder, monkeypatch):
     monkeypatch.chdir(folder)
     monkeypatch.setattr("sys.argv", [name, *COMMANDS[name], FOLDER.get(name, "--out"), "out"])
     return importlib.import_module(name).main()
-
-
-def without_seconds(data):
-    if isinstance(data, dict):
-        return {key: without_seconds(value) for key, value in data.items() if key != "seconds"}
-    return [without_seconds(each) for each in data] if isinstance(data, list) else data
-
-
-def files(folder, measured):
-    """What a run wrote, but for the seconds that it measured."""
-    found = {path.name: path.read_bytes() for path in (folder / "out").iterdir()}
-    data = [without_seconds(json.loads(found[name])) for name in measured[-1:]]
-    return {name: content for name, content in found.items() if name not in measured}, data
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -81,10 +63,10 @@ def test_a_killed_command_goes_on_and_ends_with_the_same_bytes(name, tmp_path, m
             command(name, tmp_path / "parts", monkeypatch)
     assert command(name, tmp_path / "parts", monkeypatch) == 0
     assert len(set(written)) == len(written) == jobs
-    measured = MEASURED.get(name, ())
-    whole = files(tmp_path / "whole", measured)
-    assert files(tmp_path / "parts", measured) == whole
-    assert "jobs.sqlite" not in whole[0]
+    measured = MEASURED.get(name.removesuffix(".__main__"), ())
+    whole = contents(tmp_path / "whole" / "out", measured)
+    assert contents(tmp_path / "parts" / "out", measured) == whole
+    assert "jobs.sqlite" not in whole
     with pytest.raises(SystemExit):
         command(name, tmp_path / "parts", monkeypatch)
     assert "this run is finished; pass --overwrite to do it again" in capsys.readouterr().err
