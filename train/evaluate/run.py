@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import ClassVar, Final, Literal
+from typing import Any, ClassVar, Final, Literal
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
@@ -21,9 +21,8 @@ from agents.control.optimum import saturating
 from agents.drives.optimisation import OptimisedDrive
 from agents.drives.tuned import TUNED
 from agents.policy import Knowledge, Policy
-from agents.registry import DRUM_STILL, OPTIMUM, BuildContext, PolicySpec, as_spec, choose_all
+from agents.registry import DRUM_STILL, OPTIMUM, BuildContext, PolicySpec, Spread, as_spec, choose, choose_all, in_turn
 from agents.rollout import Episodes, held_out_scenarios, run
-from train.evaluate.figure import comparison_figure
 from train.evaluate.statistics import Entry, Mask, Row, compare, compare_families
 from train.evaluate.tables import rich_table, write_comparison
 from train.shared.job_store import JOBS, JobStore, version_of
@@ -148,7 +147,8 @@ def run_all(
     """Run the drum still and every policy that was chosen over the held-out scenarios.
 
     What is finished, each policy's run over a block of scenarios and each drive that one needs, is kept in the file
-    ``jobs``, and not computed again. Drives are optimised ``where``.
+    ``jobs``, and not computed again. Drives are optimised ``where``; policies run there too where it was asked for,
+    and otherwise in this process, which has not to start others for that.
     """
     config = held_out.config
     scenarios = held_out_scenarios(config.source, held_out.number)
@@ -166,47 +166,86 @@ def run_all(
             console=console,
         ) as progress,
     ):
-        for spec in (DRUM_STILL, *(c for c in specs if c.name != DRUM_STILL.name)):
+        chosen = (DRUM_STILL, *(c for c in specs if c.name != DRUM_STILL.name))
+        if where.asked_for:
+            elsewhere = [
+                _Part(spec.text, spec.name, spec.digest, config, scenarios[block.start : block.stop], block.start)
+                for spec in chosen
+                if spec.text and not spec.for_each_scenario
+                for block in _blocks(len(scenarios))
+            ]
+            run_jobs(
+                _run_elsewhere, elsewhere, _Part.key, store=ran, where=where, progress=progress, description="policies"
+            )
+        for spec in chosen:
             mine = first if spec.for_each_scenario else scenarios
             if not mine:
                 continue
-            blocks = [range(begin, min(begin + BLOCK, len(mine))) for begin in range(0, len(mine), BLOCK)]
+            blocks = _blocks(len(mine))
             bar = progress.add_task(spec.name, total=len(blocks) * config.steps)
             parts = []
             for i, block in enumerate(blocks):
-                identity = [spec.name, spec.digest, config, block.start, len(block)]
-                parts.append(
-                    ran.get(identity, partial(_run_block, spec, config, mine, block, drives, where, progress, bar))
-                )
+                part = _Part(spec.text, spec.name, spec.digest, config, mine[block.start : block.stop], block.start)
+                parts.append(ran.get(part.key(), partial(_run_here, spec, part, drives, where, progress, bar)))
                 progress.update(bar, completed=(i + 1) * config.steps)
             episodes = Episodes.joined([part.episodes for part in parts])
             entries.append(Entry(spec.name, parts[0].knows, episodes, spec.text))
     return Comparison(tuple(entries), tuple(scenarios), config)
 
 
-def _run_block(
+@dataclass(frozen=True)
+class _Part:
+    """A policy's run over a block of the scenarios."""
+
+    text: str
+    name: str
+    digest: str
+    config: TaskConfig
+    scenarios: Sequence[Scenario]
+    first: int
+    """Number of the first scenario."""
+
+    def key(self) -> list[Any]:
+        """What identifies the run."""
+        return [self.name, self.digest, self.config, self.first, len(self.scenarios)]
+
+    def run(self, spec: PolicySpec, spread: Spread = in_turn, advance: Callable[[], object] = lambda: None) -> _Ran:
+        """Build the policy, and run it; ``advance`` is called after each step."""
+        policy = spec.build(BuildContext(scenarios=self.scenarios, config=self.config, spread=spread))
+        seen = self.config.replaced(observation=observation_of(policy, self.config))
+        episodes = run(policy, self.scenarios, seen, first=self.first, progress=lambda _: advance())
+        return _Ran(policy.knows, episodes)
+
+
+def _blocks(count: int) -> list[range]:
+    return [range(begin, min(begin + BLOCK, count)) for begin in range(0, count, BLOCK)]
+
+
+def _run_elsewhere(part: _Part) -> _Ran:
+    """Run a policy that another process has chosen; what it is chosen by must be the same here."""
+    spec = choose(part.text)
+    if spec.digest != part.digest:
+        raise InvalidValue(f"policy = {part.text!r}: has changed since it was chosen, or is another on this machine")
+    return part.run(spec)
+
+
+def _run_here(
     spec: PolicySpec,
-    config: TaskConfig,
-    scenarios: Sequence[Scenario],
-    block: range,
+    part: _Part,
     drives: JobStore[OptimisedDrive],
     where: Where,
     progress: Progress,
     bar: TaskID,
 ) -> _Ran:
-    mine = scenarios[block.start : block.stop]
     spread = partial(
         run_jobs,
-        key=lambda scenario: [spec.name, config, scenario],
+        key=lambda scenario: [spec.name, part.config, scenario],
         store=drives,
         where=where,
         progress=progress,
         description=f"{spec.name}: preparing",
     )
-    policy = spec.build(BuildContext(scenarios=mine, config=config, spread=spread))
-    seen = config.replaced(observation=observation_of(policy, config))
-    episodes = run(policy, mine, seen, first=block.start, progress=lambda _: progress.advance(bar))
-    return _Ran(policy.knows, episodes)
+    return part.run(spec, spread, lambda: progress.advance(bar))
 
 
 def observation_of(policy: Policy, config: TaskConfig) -> task.Observation:
@@ -221,6 +260,8 @@ def observation_of(policy: Policy, config: TaskConfig) -> task.Observation:
 
 def write(folder: Path, comparison: Comparison, console: Console) -> None:
     """Write figures, table and picture of a comparison into a folder, then print the table."""
+    from train.evaluate.figure import comparison_figure  # its libraries take a second, which every training would wait
+
     write_comparison(folder, comparison.families, comparison.rows, comparison.entries)
     comparison_figure(folder / "comparison.png", comparison.entries, comparison.still, comparison.families)
     console.print(rich_table(comparison.families))

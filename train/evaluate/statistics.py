@@ -10,7 +10,6 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import bootstrap
 
 from agents.policy import FloatArray, Knowledge
 from agents.rollout import Episodes
@@ -51,6 +50,8 @@ class Interval:
         if len(values) < 2 or np.ptp(values) == 0.0:
             middle = float(statistic(values))
             return cls(middle, middle, middle)
+        from scipy.stats import bootstrap  # a second to import, which every training would wait
+
         interval = bootstrap(
             (values,),
             statistic,

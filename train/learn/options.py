@@ -8,15 +8,16 @@ from pathlib import Path
 from typing import Literal
 
 from aframe_env.config import TaskConfig
-from aframe_env.validation import require_choice, require_integer, require_number
+from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
 from agents.learned.features import ACTIONS, Action, FeatureConfig
 from agents.learned.interface import InterfaceConfig
 from train.evaluate.run import HeldOut
+from train.shared.jobs import Where
 from train.shared.run_folder import RunOptions
 
 
 @dataclass(frozen=True, kw_only=True)
-class LearningOptions(RunOptions):
+class LearningOptions(RunOptions, Where):
     """Options that all learners share."""
 
     timesteps: int = 1_000_000
@@ -27,6 +28,8 @@ class LearningOptions(RunOptions):
     """Seeds everything; the same seed gives the same agent."""
     seeds: int = 1
     """Train so many agents, with seeds one after another, each in a folder of its own."""
+    workers: int | None = 1
+    """Of ``seeds``, trainings that run at once."""
     observation: Literal["state", "sensors"] = "state"
     """Observation of the agent."""
     action: Action = "residual"
@@ -77,6 +80,9 @@ class LearningOptions(RunOptions):
     """Where figures go beside the CSV file: tensorboard, wandb, mlflow, or several of them."""
 
     def __post_init__(self) -> None:
+        Where.__post_init__(self)
+        if self.cluster is not None and self.seeds == 1:
+            raise InvalidValue(f"cluster = {self.cluster!r}: goes with --seeds, for one training is one job")
         require_integer("timesteps", self.timesteps, low=1, high=10**12)
         require_integer("n_envs", self.n_envs, low=1, high=2**20)
         require_integer("seed", self.seed, low=0, high=2**32 - 1)

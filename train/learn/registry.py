@@ -11,6 +11,7 @@ from typing import Final
 from gymnasium.error import DependencyNotInstalled
 
 from train.learn.learner import LearnerSpec
+from train.learn.options import LearningOptions
 
 LEARNERS: Final = {
     "ppo": "train.learn.ppo",
@@ -27,4 +28,10 @@ def find_learner(name: str) -> LearnerSpec:
         spec: LearnerSpec = import_module(LEARNERS[name]).SPEC
     except ModuleNotFoundError as error:
         raise DependencyNotInstalled(f'{error.name} is not installed: pip install "aframe-heave[cuda]"') from error
+    return spec
+
+
+def learner_of(options: LearningOptions) -> LearnerSpec:
+    """Return the learner whose options these are: a module has both."""
+    spec: LearnerSpec = import_module(type(options).__module__).SPEC
     return spec

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 import time
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -20,17 +23,20 @@ from train.learn.checkpoint import FOLDER, Checkpoints, KeepCheckpoints, Stopped
 from train.learn.learner import LearnerSpec, Rows
 from train.learn.logs import open_logger, require_logs
 from train.learn.options import LearningOptions
-from train.learn.registry import find_learner
+from train.learn.registry import find_learner, learner_of
 from train.learn.selection import KeepBest
 from train.learn.trained import best_policy, save
 from train.shared.cli import parse, read_options, to_mapping
 from train.shared.console import PlainConsole
+from train.shared.jobs import Where, run_jobs
 from train.shared.run_folder import (
     CONFIG,
     Run,
     open_run,
+    release,
     user_errors,
     versions,
+    write_atomically,
     write_json,
 )
 
@@ -103,20 +109,62 @@ def train(spec: LearnerSpec, options: LearningOptions, console: Console) -> int:
         return _train_one(spec, options, console)
     opened = open_run(options, spec.command, goes_on=True)
     opened.record(options)
-    for seed in range(options.seed, options.seed + options.seeds):
-        one = replace(options, seed=seed, seeds=1, out=opened.folder / f"seed-{seed}")
-        if opened.taken_up and _finished(one):
-            console.print(f"{one.out}: finished already")
+    each = [
+        replace(options, seed=seed, seeds=1, cluster=None, out=opened.folder / f"seed-{seed}")
+        for seed in range(options.seed, options.seed + options.seeds)
+    ]
+    if options.asked_for:
+        _learn_elsewhere([one for one in each if not (opened.taken_up and _learned(_folder(one)))], options)
+        each = [replace(one, overwrite=False) for one in each]
+    for one in each:
+        if (opened.taken_up or options.asked_for) and _finished(one):
+            console.print(f"{one.out}: finished")
             continue
         if status := _train_one(spec, one, console):
             return status
     return 0
 
 
+@dataclass(frozen=True)
+class _Training:
+    """A training for another process."""
+
+    options: LearningOptions
+    command: tuple[str, ...]
+    """Command line of the process that asks for it."""
+
+    def run(self) -> dict[str, bytes]:
+        """Learn in the folder of the options, from the newest checkpoint there; return what is in it, by name."""
+        sys.argv, console, folder = list(self.command), PlainConsole(), _folder(self.options)
+        console.quiet = True
+        try:
+            status = _train_one(learner_of(self.options), self.options, console, compared=False)
+        finally:
+            release(folder)
+        if status:
+            raise RuntimeError(f"{folder}: stopped by a signal ({status})")
+        return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def _learn_elsewhere(trainings: Sequence[LearningOptions], where: Where) -> None:
+    """Let other processes learn, and see to it that what they wrote is on this machine."""
+    jobs = [_Training(one, tuple(sys.argv)) for one in trainings]
+    for one, files in zip(trainings, run_jobs(_Training.run, jobs, where=where, description="trainings"), strict=True):
+        for name, data in files.items():
+            path = _folder(one) / name
+            if not path.exists() or path.read_bytes() != data:
+                write_atomically(path, partial(Path.write_bytes, data=data))
+
+
+def _folder(options: LearningOptions) -> Path:
+    assert options.out is not None
+    return options.out
+
+
 def _finished(options: LearningOptions) -> bool:
     """Whether the training of these options ended, its comparison included."""
-    assert options.out is not None
-    return _learned(options.out) and (not options.eval_scenarios or (options.out / EVALUATED).exists())
+    folder = _folder(options)
+    return _learned(folder) and (not options.eval_scenarios or (folder / EVALUATED).exists())
 
 
 def _learned(folder: Path) -> bool:
@@ -130,7 +178,7 @@ def _learned(folder: Path) -> bool:
     return not data["interrupted"]
 
 
-def _train_one(spec: LearnerSpec, options: LearningOptions, console: Console) -> int:
+def _train_one(spec: LearnerSpec, options: LearningOptions, console: Console, *, compared: bool = True) -> int:
     opened = open_run(options, spec.command, goes_on=True)
     folder = opened.folder
     if opened.taken_up and _finished(replace(options, out=folder)):
@@ -150,7 +198,7 @@ def _train_one(spec: LearnerSpec, options: LearningOptions, console: Console) ->
             raise
         if status:
             return status
-    if options.eval_scenarios:
+    if options.eval_scenarios and compared:
         evaluate(load(folder), folder, options.held_out, console)
     return 0
 

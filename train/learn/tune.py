@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -28,13 +28,14 @@ from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.validation import InvalidValue, require_choice, require_integer
 from agents.policy import DrumStill, FloatArray
 from agents.rollout import HELD_OUT_SEED, drawn_scenarios, run
-from train.learn.learner import LearnerSpec, Search
+from train.learn.learner import Search
 from train.learn.options import LearningOptions
 from train.learn.registry import LEARNERS, find_learner
 from train.learn.trained import to_policy
 from train.shared.cli import parse, to_mapping
 from train.shared.console import PlainConsole
 from train.shared.job_store import JobStore, version_of
+from train.shared.jobs import Where, run_jobs
 from train.shared.markdown import table
 from train.shared.run_folder import Run, RunOptions, open_jobs, user_errors, write_text
 from train.shared.scenarios import ScenarioOptions
@@ -44,7 +45,7 @@ VALIDATION_SEED: Final = 7_000_001
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options(RunOptions, ScenarioOptions):
+class Options(RunOptions, Where, ScenarioOptions):
     """Learner, and size of the search."""
 
     algorithm: str = "ppo"
@@ -57,17 +58,23 @@ class Options(RunOptions, ScenarioOptions):
     """Control steps to learn from in a trial; by default those of a training."""
     scenarios: int | Path = 200
     """Number of validation scenarios; or a TOML file with a scenario or a distribution of your own."""
+    at_once: int = 1
+    """Trials that are drawn before any of them is told of: as many can run side by side."""
+    workers: int | None = 1
+    """Trials that run at once, out of those that are drawn together."""
     seed: int = 0
     """Seed of the search; trial k learns with seed + k, so that no seed is tuned for."""
     out: Path | None = Path("runs/tune")
     """Output folder, or that of a search to go on with."""
 
     def __post_init__(self) -> None:
-        super().__post_init__()
+        Where.__post_init__(self)
+        ScenarioOptions.__post_init__(self)
         require_choice("algorithm", self.algorithm, tuple(LEARNERS))
         if find_learner(self.algorithm).search is None:
             raise InvalidValue(f"algorithm = {self.algorithm!r}: has no search space in its SPEC")
         require_integer("trials", self.trials, low=1, high=10**6)
+        require_integer("at_once", self.at_once, low=1, high=1000)
         if self.timesteps is not None:
             require_integer("timesteps", self.timesteps, low=1, high=10**12)
         require_integer("seed", self.seed, low=0, high=2**31)
@@ -152,14 +159,14 @@ def rows(trials: Sequence[Trial]) -> str:
 class Judge:
     """What trials are judged by."""
 
-    spec: LearnerSpec
+    algorithm: str
     scenarios: Sequence[Scenario]
     still: FloatArray
     """RMS depth error of each with the drum still, m."""
 
     def score(self, options: LearningOptions) -> Score:
         """Learn with ``options``, and look at the agent."""
-        learner = self.spec.build(options)
+        learner = find_learner(self.algorithm).build(options)
         try:
             learner.model.learn(options.timesteps)
             policy, _ = to_policy(learner, options)
@@ -177,8 +184,10 @@ def search(options: Options, opened: Run, console: Console) -> list[Trial]:
     assert spec.search is not None
     space, defaults = spec.search, spec.options()
     scenarios = validation_scenarios(options.source, options.number)
-    judge = Judge(spec, scenarios, run(DrumStill(), scenarios, defaults.config).rms)
-    study = optuna.create_study(direction="maximize", sampler=optuna.samplers.TPESampler(seed=options.seed))
+    judge = Judge(options.algorithm, scenarios, run(DrumStill(), scenarios, defaults.config).rms)
+    # Of trials that run beside it, a new one must not be a twin.
+    sampler = optuna.samplers.TPESampler(seed=options.seed, constant_liar=options.at_once > 1)
+    study = optuna.create_study(direction="maximize", sampler=sampler)
     study.enqueue_trial({name: getattr(defaults, name) for name in space.names})
     trials: list[Trial] = []
     with (
@@ -186,27 +195,44 @@ def search(options: Options, opened: Run, console: Console) -> list[Trial]:
         JobStore(opened.jobs, Score, version_of(aframe_env, agents, train.learn)) as store,
     ):
         bar = progress.add_task("trials", total=options.trials)
-        for number in range(options.trials):
-            asked = study.ask()
-            parameters = suggest(asked, space)
-            chosen = replace(
-                defaults,
-                **parameters,
-                scenarios=options.scenarios if isinstance(options.scenarios, Path) else None,
-                observation=options.observation,
-                seed=options.seed + number,
-                timesteps=options.timesteps or defaults.timesteps,
-            )
-            key = [options.algorithm, to_mapping(chosen), options.source, options.number]
-            score = store.get(key, partial(judge.score, chosen))
-            state = optuna.trial.TrialState.FAIL if score.median is None else optuna.trial.TrialState.COMPLETE
-            study.tell(asked, score.median, state)
-            trials.append(Trial(number, chosen.seed, parameters, score))
-            write_text(opened.folder / "trials.csv", rows(trials))
-            write_text(opened.folder / "study.md", trials_table(trials))
-            console.print(f"trial {number}: {trials[-1].cells[0]} {score.failure}".rstrip())
-            progress.advance(bar)
+        for first in range(0, options.trials, options.at_once):
+            asked = [study.ask() for _ in range(first, min(first + options.at_once, options.trials))]
+            parameters = [suggest(each, space) for each in asked]
+            chosen = [
+                replace(
+                    defaults,
+                    **each,
+                    scenarios=options.scenarios if isinstance(options.scenarios, Path) else None,
+                    observation=options.observation,
+                    seed=options.seed + number,
+                    timesteps=options.timesteps or defaults.timesteps,
+                )
+                for number, each in enumerate(parameters, first)
+            ]
+            scores = _scores(judge, chosen, options, store)
+            for number, score in enumerate(scores, first):
+                k = number - first
+                state = optuna.trial.TrialState.FAIL if score.median is None else optuna.trial.TrialState.COMPLETE
+                study.tell(asked[k], score.median, state)
+                trials.append(Trial(number, chosen[k].seed, parameters[k], score))
+                write_text(opened.folder / "trials.csv", rows(trials))
+                write_text(opened.folder / "study.md", trials_table(trials))
+                console.print(f"trial {number}: {trials[-1].cells[0]} {score.failure}".rstrip())
+                progress.advance(bar)
     return trials
+
+
+def _scores(
+    judge: Judge, chosen: Sequence[LearningOptions], options: Options, store: JobStore[Score]
+) -> Iterable[Score]:
+    """Scores of trials that were drawn together: one after another in this process, or where it was asked for."""
+
+    def key(one: LearningOptions) -> list[Any]:
+        return [options.algorithm, to_mapping(one), options.source, options.number]
+
+    if options.asked_for:
+        return run_jobs(judge.score, chosen, key, store=store, where=options, description="trials drawn together")
+    return (store.get(key(one), partial(judge.score, one)) for one in chosen)
 
 
 def main() -> int:

@@ -39,6 +39,11 @@ class Where:
         if self.cluster is not None and not re.fullmatch(r"auto|[^\s:/]+:[0-9]{1,5}", self.cluster):
             raise InvalidValue(f"cluster = {self.cluster!r}: must be auto or HOST:PORT, as in 10.0.0.1:6379")
 
+    @property
+    def asked_for(self) -> bool:
+        """Whether more than one process of this machine was asked for in words."""
+        return self.cluster is not None or (self.workers or 1) > 1
+
     def outcomes(
         self, fn: Callable[[Item], Result], jobs: deque[Job[Item]], attempts: int
     ) -> Generator[tuple[Job[Item], Success[Result] | Failure], None, None]:

@@ -233,6 +233,13 @@ def _lock(folder: Path) -> None:
     _LOCKS[key] = handle
 
 
+def release(folder: Path) -> None:
+    """Let other processes fill a folder that this one has opened a run in."""
+    handle = _LOCKS.pop(folder.resolve(), None)
+    if handle is not None:
+        os.close(handle)
+
+
 @contextlib.contextmanager
 def user_errors() -> Iterator[None]:
     """One line on standard error for bad input, a failing disk or job, a missing extra (status 2) and Ctrl-C (130).
