@@ -50,20 +50,7 @@ def test_trials_run_side_by_side(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     from train.learn import tune
 
     for name, workers in (("one", "1"), ("two", "2")):
-        few = (
-            "--algorithm",
-            "sac",
-            "--timesteps",
-            "64",
-            "--scenarios",
-            "3",
-            "--trials",
-            "2",
-            "--at-once",
-            "2",
-            "--workers",
-            workers,
-        )
+        few = f"--algorithm sac --timesteps 64 --scenarios 3 --trials 2 --at-once 2 --workers {workers}".split()
         monkeypatch.setattr("sys.argv", ["train.tune", *few, "--out", str(tmp_path / name)])
         assert tune.main() == 0
     for name in ("trials.csv", "study.md"):
