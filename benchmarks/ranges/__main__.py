@@ -55,13 +55,15 @@ def main() -> int:
         with Progress(*columns, console=console) as progress:
             bar = progress.add_task("steps", total=options.steps)
             batch = options.seed
-            while Rows.steps < options.steps:
+            count = Rows.count
+            while count.steps < options.steps:
                 progress.update(bar, description=f"steps, seed {batch}")
                 for machine in (Rows, Tensors):
                     run_state_machine_as_test(seed(batch)(machine), settings=BATCH)
-                progress.update(bar, completed=Rows.steps)
+                progress.update(bar, completed=count.steps)
                 batch += 1
-        console.print(f"{Rows.steps} steps clean, seeds {options.seed} to {batch - 1}")
+        said = ", ".join(f"{begun} on the model {model!r}" for model, begun in count.episodes.items())
+        console.print(f"{count.steps} steps clean, seeds {options.seed} to {batch - 1}; episodes: {said}")
     return 0
 
 

@@ -9,6 +9,7 @@ import copy
 import pickle
 import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -21,6 +22,7 @@ from tensordict import TensorDict
 
 from aframe_env import Scenario, ScenarioDistribution, SmallRotationWarning
 from aframe_env.config import TaskConfig
+from aframe_env.dynamics.start import longest_inner_step
 from aframe_env.env import AFrameHeaveEnv
 from aframe_env.torch_env import AFrameHeaveTorchEnv
 from aframe_env.vector_env import AFrameHeaveVectorEnv
@@ -30,6 +32,8 @@ MOST_ROWS: Final = 10
 """More than a block of rows."""
 MOST_STEPS: Final = 40
 """Most steps of a rule."""
+MOST_INNER_STEPS: Final = 500
+"""About the most inner steps of a step: a stiff rope gets a short control step, or little would be tried."""
 
 
 @st.composite
@@ -38,6 +42,7 @@ def tasks(draw: st.DrawFn) -> TaskConfig:
     model = draw(st.sampled_from(["simplified", "rfem"]))
     source: Scenario | ScenarioDistribution = draw(st.one_of(values.scenarios(), values.distributions()))
     period = draw(st.one_of(st.just(0.1), values.intervals_of(TaskConfig())["control_period"].values))
+    period = short_enough(period, source if isinstance(source, Scenario) else source.nominal())
     changes: dict[str, Any] = (
         {"rfes": (3, 2), "rfem_modes": draw(st.sampled_from([None, 5]))} if model == "rfem" else {}
     )
@@ -53,11 +58,26 @@ def tasks(draw: st.DrawFn) -> TaskConfig:
     )
 
 
+def short_enough(period: float, scenario: Scenario) -> float:
+    """A control step in its range, of no more than some inner steps."""
+    inner_step = longest_inner_step(scenario.rope_frequency, scenario.rope_damping_rate)
+    return max(1e-3, min(period, MOST_INNER_STEPS * inner_step))
+
+
+@dataclass
+class Count:
+    """What all machines have done."""
+
+    steps: int = 0
+    """Steps of a row, made by itself and among others."""
+    episodes: dict[str, int] = field(default_factory=lambda: {"simplified": 0, "rfem": 0})
+    """Episodes that were begun on each model."""
+
+
 class Rows(RuleBasedStateMachine):
     """A vector environment beside one environment for each of its rows."""
 
-    steps = 0
-    """Steps of a row that all machines have made."""
+    count = Count()
 
     @initialize(
         config=tasks(),
@@ -76,6 +96,7 @@ class Rows(RuleBasedStateMachine):
         with turned_too_far():
             observations, infos = self.together.reset(seed=seed)
             own = [env.reset(seed=seed + i) for i, env in enumerate(self.alone)]
+        self._begun(rows)
         self._same(observations, [each[0] for each in own])
         self._same_infos(infos, [each[1] for each in own])
 
@@ -146,7 +167,7 @@ class Rows(RuleBasedStateMachine):
         with turned_too_far():
             observations, rewards, terminations, truncations, infos = self.together.step(actions)
             own = [self._step_alone(i, actions[i]) for i in range(self.rows)]
-        Rows.steps += self.rows
+        self.count.steps += self.rows
         np.testing.assert_array_equal(rewards, [each[1] for each in own])
         np.testing.assert_array_equal(terminations, [each[2] for each in own])
         np.testing.assert_array_equal(truncations, [each[3] for each in own])
@@ -160,10 +181,12 @@ class Rows(RuleBasedStateMachine):
         """What a row does as its mode says, by itself."""
         env = self.alone[index]
         if self.mode is AutoresetMode.NEXT_STEP and self.ended[index]:
+            self._begun(1)
             observation, info = env.reset()
             return observation, 0.0, False, False, info
         observation, reward, terminated, truncated, info = env.step(action)
         if self.mode is AutoresetMode.SAME_STEP and (terminated or truncated):
+            self._begun(1)
             observation, info = env.reset()
         return observation, reward, terminated, truncated, info
 
@@ -174,7 +197,11 @@ class Rows(RuleBasedStateMachine):
             for index in np.flatnonzero(mask).tolist():
                 own, _ = self.alone[index].reset(seed=None if seed is None else seed + index, options=options)
                 np.testing.assert_array_equal(observations[index], own)
+        self._begun(int(mask.sum()))
         self.ended &= ~mask
+
+    def _begun(self, episodes: int) -> None:
+        self.count.episodes[self.together.simulation.config.model] += episodes
 
     def _same(self, observations: npt.NDArray[np.float32], own: Sequence[npt.NDArray[np.float32]]) -> None:
         np.testing.assert_array_equal(observations, np.array(own))
@@ -189,10 +216,13 @@ class Rows(RuleBasedStateMachine):
 class Tensors(RuleBasedStateMachine):
     """Rows with tensors in and out beside one environment for each, on a scenario of their own."""
 
+    count = Rows.count
+
     @initialize(scenario=values.scenarios(), rows=st.integers(1, MOST_ROWS), steps=st.integers(1, 60))
     def make(self, scenario: Scenario, rows: int, steps: int) -> None:
         """Make and reset both."""
-        config = TaskConfig(scenario=scenario, episode_duration=0.1 * steps)
+        period = short_enough(0.1, scenario)
+        config = TaskConfig(scenario=scenario, control_period=period, episode_duration=period * steps)
         self.together = AFrameHeaveTorchEnv(rows, config, device="cpu")
         self.alone = [AFrameHeaveEnv(config) for _ in range(rows)]
         self.limit = float(self.together.action_space.high[0])  # type: ignore[attr-defined]
@@ -206,7 +236,7 @@ class Tensors(RuleBasedStateMachine):
         for _ in range(count):
             actions = (size * self.limit * rng.uniform(-1.0, 1.0, (len(self.alone), 1))).astype(np.float32)
             observations, rewards, dones, extras = self.together.step(torch.from_numpy(actions))
-            Rows.steps += len(self.alone)
+            self.count.steps += len(self.alone)
             finals, own = [], []
             for i, env in enumerate(self.alone):
                 observation, reward, terminated, truncated, _ = env.step(actions[i])
