@@ -373,7 +373,7 @@ def run(options: Options, console: Console) -> int:
     """Make the sets, one after the other."""
     for package in ("minari", "h5py"):
         if find_spec(package) is None:
-            raise DependencyNotInstalled(f"{package} is not installed: pip install 'aframe-heave[data]'")
+            raise DependencyNotInstalled(f'{package} is not installed: pip install "aframe-heave[data]"')
     from minari.storage import get_dataset_path
 
     asked, command = recipes(options), command_line("train.dataset")

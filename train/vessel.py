@@ -137,7 +137,7 @@ def compute(options: Options, console: Console) -> tuple[FloatArray, FloatArray,
     try:
         import capytaine as cpt
     except ImportError:
-        raise InvalidValue("train.vessel needs Capytaine: pip install 'aframe-heave[vessel]'") from None
+        raise InvalidValue('capytaine is not installed: pip install "aframe-heave[vessel]"') from None
     cpt.set_logging("ERROR")
     faces = hull_faces(options)
     mesh = cpt.Mesh(vertices=faces.reshape(-1, 3), faces=np.arange(4 * len(faces)).reshape(-1, 4))

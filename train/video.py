@@ -164,7 +164,7 @@ def run(options: Options, console: Console) -> int:
     writer = WRITERS[out.suffix.lower()]
     for package in ("pygame", writer.package):
         if find_spec(package) is None:
-            raise DependencyNotInstalled(f"{package} is not installed: pip install 'aframe-heave[video]'")
+            raise DependencyNotInstalled(f'{package} is not installed: pip install "aframe-heave[video]"')
     episode = begin(options)
     fps = writer.rate(options.fps or writer.fps)
 

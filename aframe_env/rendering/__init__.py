@@ -41,4 +41,4 @@ def _require_pygame() -> None:
     try:
         import pygame  # noqa: F401
     except ImportError as error:
-        raise DependencyNotInstalled("render() needs pygame: pip install 'aframe-heave[render]'") from error
+        raise DependencyNotInstalled('pygame is not installed: pip install "aframe-heave[render]"') from error

@@ -142,7 +142,7 @@ def load(agent: str | Path) -> LearnedPolicy:
     try:
         weights = (path / WEIGHTS).read_bytes()
     except OSError as error:
-        raise InvalidValue(f"no agent in {str(path)!r}: {error}") from error
+        raise InvalidValue(f"no agent in {str(path)!r}: {WEIGHTS}: {error.strerror}") from error
     card = structure(strict_converter(), cards.read(path / CARD, "agent", FORMAT), AgentCard, str(path / CARD))
     if digest(weights) != card.sha256:
         raise InvalidValue(f"{path / WEIGHTS}: does not match the sha256 in {CARD}: damaged or not its file")

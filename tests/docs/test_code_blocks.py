@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import functools
 import importlib
+import os
 import re
 import runpy
 import shlex
@@ -186,6 +187,19 @@ def test_commands_are_taken(page: Path, desk: Path, parsed: Callable[[str], Any]
                 made.add(getattr(parsed(line), "out", None))
 
     assert evaluate(Sybil([CodeBlockParser("sh", check)]).parse(page)) == blocks(page).count("sh")
+
+
+def test_a_script_with_worker_processes_runs_as_a_file(tmp_path: Path) -> None:
+    """Sybil calls no block ``__main__``, and workers import the script: it has to be run as a reader runs it."""
+    page = (ROOT / "docs/use.md").read_text("utf-8")
+    (script,) = (each for each in re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL) if "__main__" in each)
+    (tmp_path / "compare.py").write_text(script, "utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "default"}
+    command = [sys.executable, "compare.py"]
+    ran = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    rows = re.findall(r"^(\S.*?) +(-?\d+\.\d\d)%$", ran.stdout, flags=re.MULTILINE)
+    assert [name for name, _ in rows] == ["drum still", "S-Ω1 for each scenario", "feed-forward + feedback (state)"]
+    assert float(rows[1][1]) > 95
 
 
 def test_commands_within_the_text_are_taken(desk: Path, parsed: Callable[[str], Any]) -> None:

@@ -172,7 +172,7 @@ def test_bad_input_is_refused_in_a_sentence(
     assert "quadratic programme" in predictive
     assert "aframe export ppo-sensors" in predictive
     monkeypatch.setitem(sys.modules, "onnx", None)
-    assert "pip install 'aframe-heave[onnx]'" in said(capsys, monkeypatch, "ppo", "--out", str(out))
+    assert 'is not installed: pip install "aframe-heave[onnx]"' in said(capsys, monkeypatch, "ppo", "--out", str(out))
     assert not out.exists()
     with pytest.raises(InvalidValue, match=r"check = -1: must be in \[0, 20000\]"):
         command.Options(agent="ppo", check=-1)

@@ -26,7 +26,7 @@ REPORT_PACKAGES = ("jinja2", "plotly", "pyarrow")
 def needed_for_the_report() -> str:
     """What the report still needs, and the command that helps; empty where it needs nothing."""
     missing = [name for name in REPORT_PACKAGES if find_spec(name) is None]
-    return f"needs {', '.join(missing)}; pip install 'aframe-heave[report]'" if missing else ""
+    return f'{", ".join(missing)} not installed: pip install "aframe-heave[report]"' if missing else ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +83,7 @@ def main() -> int:
                     write_report(folder / "report.html", comparison, opened.command)
                 console.print(f"report: {folder / 'report.html'}")
             elif needed := needed_for_the_report():
-                console.print(f"no report: it {needed}")
+                console.print(f"no report: {needed}")
         except KeyboardInterrupt:
             console.print("interrupted: what is finished is kept; the same command goes on from there")
             return 130

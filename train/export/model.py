@@ -54,7 +54,7 @@ def export(agent: LearnedPolicy) -> tuple[onnx.ModelProto, dict[str, Any]]:
         import onnx
         import onnxscript  # noqa: F401 - the exporter needs it
     except ImportError as error:
-        raise DependencyNotInstalled(f"needs {error.name}; pip install 'aframe-heave[onnx]'") from None
+        raise DependencyNotInstalled(f'{error.name} is not installed: pip install "aframe-heave[onnx]"') from None
 
     controller = Controller(agent).eval()
     described = description(agent, controller)

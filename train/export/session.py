@@ -20,7 +20,7 @@ class Session:
         try:
             import onnxruntime
         except ImportError:
-            raise DependencyNotInstalled("needs onnxruntime; pip install 'aframe-heave[onnx]'") from None
+            raise DependencyNotInstalled('onnxruntime is not installed: pip install "aframe-heave[onnx]"') from None
         options = onnxruntime.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         self._session: Any = onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])

@@ -99,7 +99,7 @@ def sobol_indices(
         from SALib.analyze import sobol as analysis
         from SALib.sample import sobol as sampling
     except ImportError:
-        raise InvalidValue("train.sensitivity needs SALib: pip install 'aframe-heave[sensitivity]'") from None
+        raise InvalidValue('SALib is not installed: pip install "aframe-heave[sensitivity]"') from None
     problem = {
         "num_vars": len(factors),
         "names": [factor.name for factor in factors],
