@@ -85,7 +85,8 @@ class FlexibleEngine(Engine):
         self._tables, self._readout_tables = np.zeros((0, 0)), np.zeros((0, 0))
         super().__init__(rows, control_period, components, max_inner_step)
         self._flexible_kernels = flexible_kernels(self._lanes)
-        self._readout = readout_kernel(self._lanes, rows > at.LANES)
+        readout = readout_kernel(self._lanes)
+        self._readout = readout if rows > at.LANES else readout.serial
 
     def read_frames(self) -> FloatArray:
         """Deflection of S, reactions, servomotor tensions, utilisation, rotation of all rows: (rows, READOUTS)."""
