@@ -6,6 +6,7 @@ user's cache folder. Where none of these can be written to, each process compile
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import logging
 import os
@@ -21,6 +22,8 @@ from numba import njit, types
 from numba.core import config, event
 from numba.extending import intrinsic
 from numba.np.ufunc.parallel import threading_layer
+
+from aframe_env.dynamics.kernel_cache import KernelCache
 
 _LOGGER = logging.getLogger("aframe_env")
 
@@ -125,10 +128,11 @@ def _cached(function: F, **options: Any) -> F:
     variant = hashlib.sha256(f"{source_digest()} {cells!r} {options} ".encode() + own_source).hexdigest()[:16]
     function.__qualname__ += f"-{variant}"
     _kernels.add(function)
-    try:
-        return cast(F, njit(cache=True, **options, **_OPTIONS)(function))
-    except RuntimeError:  # no cache folder can be written to
-        return cast(F, njit(**options, **_OPTIONS)(function))
+    compiled = njit(**options, **_OPTIONS)(function)
+    if not config.DISABLE_JIT:
+        with contextlib.suppress(RuntimeError):  # no cache folder can be written to
+            compiled._cache = KernelCache(function)
+    return cast(F, compiled)
 
 
 class _Announcer(event.Listener):
