@@ -128,6 +128,9 @@ class FlexibleEngine(Engine):
     def _frame_view(self) -> FloatArray:
         return self._frames.reshape(len(self._frames), -1, self._lanes)
 
+    def _slots_of_row(self, components: int) -> int:
+        return super()._slots_of_row(components) + self._slots
+
     def _fill(self, vector: FloatArray) -> None:
         self._frames = np.zeros((len(self._blocks), self._slots * self._lanes))
         self._frame_view[...] = vector[None, : self._slots, None]
