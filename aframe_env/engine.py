@@ -14,6 +14,7 @@ from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.start import hang_load, inner_steps, longest_inner_step, write_lift
 from aframe_env.dynamics.step import step_kernels
 from aframe_env.dynamics.wave_components import component_kernels
+from aframe_env.memory import require_memory
 from aframe_env.scenario import Scenario
 from aframe_env.scenario.motion import Components, Coordinate, ShipMotion, TabledMotion, has_components
 from aframe_env.validation import InvalidValue, require_integer, require_number
@@ -73,7 +74,12 @@ class RecordTable:
         if first is None:
             first = max((begin + length for begin, length in self._places.values()), default=0)
             # Doubled, so that the lines are copied only so often.
-            grown = np.zeros((max(first + len(table), 2 * len(self.lines)), 18))
+            count = max(first + len(table), 2 * len(self.lines))
+            require_memory(
+                f"{len(self._places) + 1} recorded motions at steps of {period:g} s",
+                self.lines.nbytes + count * table[0].nbytes + table.nbytes,
+            )
+            grown = np.zeros((count, 18))
             grown[: len(self.lines)] = self.lines
             self.lines = grown
         self.lines[first : first + len(table)] = table
@@ -116,7 +122,9 @@ class Engine:
         self._kernels = step_kernels(self._lanes)
         self._step = self._kernels.step if rows <= at.LANES else self._kernels.step_parallel
         self._components = at.padded(components)
-        self._blocks = np.zeros((-(-rows // self._lanes), at.slots(self._components) * self._lanes))
+        blocks = -(-rows // self._lanes)
+        require_memory(f"num_envs = {rows}", 8 * blocks * self._lanes * self._slots_of_row(self._components))
+        self._blocks = np.zeros((blocks, at.slots(self._components) * self._lanes))
         self._records = RecordTable()
         # Lanes beyond the last row hold the paper's case, so that no lane computes with zeros for parameters.
         idle = self.row_vector(Scenario.paper())
@@ -212,6 +220,10 @@ class Engine:
         self._kernels_of_one.start(row[None], self._components, self._records.lines)
         return row
 
+    def _slots_of_row(self, components: int) -> int:
+        """Numbers that a row takes with room for so many wave components."""
+        return at.slots(components)
+
     def _fill(self, vector: FloatArray) -> None:
         """Put every lane where ``vector`` (slots,) says."""
         self._view[...] = vector[None, :, None]
@@ -259,6 +271,8 @@ class Engine:
         if components <= self._components:
             return
         old = self._blocks
+        wider = old.nbytes // at.slots(self._components) * at.slots(at.padded(components))
+        require_memory(f"num_envs = {self.rows} with {components} wave components", old.nbytes + wider)
         self._components = at.padded(components)
         self._blocks = np.zeros((len(old), at.slots(self._components) * self._lanes))
         self._blocks[:, : old.shape[1]] = old

@@ -85,7 +85,8 @@ class FlexibleEngine(Engine):
         self._tables, self._readout_tables = np.zeros((0, 0)), np.zeros((0, 0))
         super().__init__(rows, control_period, components, max_inner_step)
         self._flexible_kernels = flexible_kernels(self._lanes)
-        self._readout = readout_kernel(self._lanes, rows > at.LANES)
+        readout = readout_kernel(self._lanes)
+        self._readout = readout if rows > at.LANES else readout.serial
 
     def read_frames(self) -> FloatArray:
         """Deflection of S, reactions, servomotor tensions, utilisation, rotation of all rows: (rows, READOUTS)."""
@@ -126,6 +127,9 @@ class FlexibleEngine(Engine):
     @property
     def _frame_view(self) -> FloatArray:
         return self._frames.reshape(len(self._frames), -1, self._lanes)
+
+    def _slots_of_row(self, components: int) -> int:
+        return super()._slots_of_row(components) + self._slots
 
     def _fill(self, vector: FloatArray) -> None:
         self._frames = np.zeros((len(self._blocks), self._slots * self._lanes))

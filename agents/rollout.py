@@ -12,6 +12,7 @@ import numpy.typing as npt
 from aframe_env import task
 from aframe_env.config import TaskConfig, task_config
 from aframe_env.dynamics import layout as at
+from aframe_env.memory import require_memory
 from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.simulation import Simulation
 from agents.policy import FloatArray, Policy
@@ -45,6 +46,11 @@ HISTORY = (task.DEPTH_ERROR, task.DRUM_SPEED, task.ROPE_TENSION)
 """Columns of the state that are kept of every control step."""
 BAND = 0.05
 """Depth error that an operator can live with, m: time beyond it is counted."""
+
+
+def history_bytes(steps: int) -> int:
+    """Memory that an episode's columns of so many control steps take."""
+    return len(HISTORY) * (steps + 1) * np.dtype(np.float32).itemsize
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,7 +145,8 @@ class _Tally:
         rows, steps = simulation.rows, simulation.episode_steps
         self._simulation = simulation
         self._radius = np.array([s.crane.winch.drum_radius for s in scenarios])
-        self._histories = np.empty((3, rows, steps + 1), dtype=np.float32)
+        require_memory(f"{rows} episodes of {steps} control steps", rows * history_bytes(steps))
+        self._histories = np.empty((len(HISTORY), rows, steps + 1), dtype=np.float32)
         self._step = 0
         self._alive = np.ones(rows, dtype=np.bool_)
         self._was_slack = np.zeros(rows, dtype=np.bool_)

@@ -6,8 +6,10 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from numba import config
 from numba.core.caching import IndexDataCacheFile
@@ -124,6 +126,83 @@ def test_two_processes_compile_at_once(tmp_path: Path) -> None:
     assert [process.returncode for process in both] == [0, 0]
     assert run(SMALL, NUMBA_CACHE_DIR=tmp_path) == (outputs[0], "")
     assert outputs[0] == outputs[1]
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A folder of compiled code, and what SMALL writes."""
+    folder = tmp_path_factory.mktemp("compiled")
+    return folder, run(SMALL, NUMBA_CACHE_DIR=folder)[0]
+
+
+@pytest.fixture
+def kept(tmp_path: Path, compiled: tuple[Path, str]) -> Path:
+    """A copy of that folder."""
+    return Path(shutil.copytree(compiled[0], tmp_path / "kept"))
+
+
+def truncated(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def emptied(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def scrambled(path: Path) -> None:
+    path.write_bytes(np.random.default_rng(1).bytes(path.stat().st_size))
+
+
+def one_bit_turned(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize("damage", [truncated, emptied, scrambled, one_bit_turned])
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+def test_a_damaged_file_of_compiled_code_is_named_once_and_made_anew(
+    kept: Path, compiled: tuple[Path, str], ending: str, damage: Callable[[Path], None]
+) -> None:
+    _, right = compiled
+    files = list(kept.rglob(f"*.{ending}"))
+    whole = [path.read_bytes() for path in files]
+    for path in files:
+        damage(path)
+    assert files
+    assert whole != [path.read_bytes() for path in files]
+    mended, said = run(SMALL, NUMBA_CACHE_DIR=kept)
+    assert mended == right
+    assert said.count("is damaged and is compiled anew") == 1
+    assert str(files[0].parent) in said
+    assert run(SMALL, NUMBA_CACHE_DIR=kept) == (right, "")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such rights")
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+def test_compiled_code_that_cannot_be_read_is_made_anew(kept: Path, compiled: tuple[Path, str], ending: str) -> None:
+    _, right = compiled
+    for path in kept.rglob(f"*.{ending}"):
+        path.chmod(0)
+    mended, said = run(SMALL, NUMBA_CACHE_DIR=kept)
+    assert mended == right
+    # Root reads whatever there is.
+    assert ("cannot be read" in said) == (os.getuid() != 0)
+    assert run(SMALL, NUMBA_CACHE_DIR=kept) == (right, "")
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+def test_compiled_code_that_can_be_neither_read_nor_kept_is_told_of(
+    kept: Path, compiled: tuple[Path, str], ending: str
+) -> None:
+    _, right = compiled
+    for path in kept.rglob(f"*.{ending}"):
+        path.unlink()
+        path.mkdir()
+    output, said = run(SMALL, NUMBA_CACHE_DIR=kept)
+    assert output == right
+    assert "cannot be read" in said
+    assert "cannot be kept" in said
 
 
 def scaled(lanes: float):  # type: ignore[no-untyped-def]

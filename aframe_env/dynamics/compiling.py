@@ -6,16 +6,24 @@ user's cache folder. Where none of these can be written to, each process compile
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import logging
+import os
+import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from types import FunctionType
+from typing import Any, Final, TypeVar, cast
 
 from numba import njit, types
 from numba.core import config, event
 from numba.extending import intrinsic
+from numba.np.ufunc.parallel import threading_layer
+
+from aframe_env.dynamics.kernel_cache import KernelCache
 
 _LOGGER = logging.getLogger("aframe_env")
 
@@ -44,9 +52,72 @@ def kernel(function: F) -> F:
     return _cached(function)
 
 
-def parallel_kernel(function: F) -> F:
-    """Compile a loop over rows that spreads over the cores, cached on disk."""
-    return _cached(function, parallel=True)
+def parallel_kernel(function: F) -> SpreadKernel:
+    """Compile a loop (``prange``) over rows that spreads over the cores, and one that does not, cached on disk."""
+    # Copies, as each takes a name of its own.
+    serial, parallel = (
+        FunctionType(function.__code__, function.__globals__, function.__name__, None, function.__closure__)
+        for _ in range(2)
+    )
+    return SpreadKernel(_cached(serial), _cached(parallel, parallel=True))
+
+
+@dataclass(frozen=True)
+class SpreadKernel:
+    """A loop over independent rows that spreads over the cores where it can, with the same bits.
+
+    It cannot in a process forked from one whose threads have run: the child has none of them, and numba aborts it, or
+    waits for ever.
+    """
+
+    serial: Callable[..., None]
+    """The same loop on the calling thread; compiled when it is first called."""
+    parallel: Callable[..., None]
+
+    def __call__(self, *arguments: Any) -> None:
+        """Run the loop."""
+        if _threads.lost:
+            self.serial(*arguments)
+        elif _threads.safe:
+            self.parallel(*arguments)
+        else:
+            with _threads.lock:
+                self.parallel(*arguments)
+                _threads.safe = _layer() in _SAFE_LAYERS
+
+
+class _Threads:
+    """What this process knows of numba's threads."""
+
+    def __init__(self, lost: bool = False) -> None:
+        self.lost = lost
+        """Whether they have stayed behind in the process that this one was forked from."""
+        self.safe = False
+        """Whether they are known to take loops from two threads at once; numba chooses the layer at the first loop."""
+        self.lock = threading.Lock()
+
+
+_SAFE_LAYERS: Final = ("tbb", "omp")
+"""The third, workqueue, ends the process when two threads run a loop at once."""
+
+
+def _layer() -> str | None:
+    """Name of numba's threading layer; None before the first parallel loop."""
+    try:
+        return cast(str, threading_layer())  # type: ignore[no-untyped-call]
+    except ValueError:
+        return None
+
+
+def _after_fork() -> None:
+    # A new lock too: a thread that the child has not may hold the old one.
+    global _threads
+    _threads = _Threads(lost=_threads.lost or _layer() is not None)
+
+
+_threads = _Threads()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)
 
 
 def _cached(function: F, **options: Any) -> F:
@@ -54,13 +125,14 @@ def _cached(function: F, **options: Any) -> F:
     # that compile at once, one could later be given the other's variant. A name of its own for each keeps them apart.
     cells = [cell.cell_contents for cell in function.__closure__ or ()]
     own_source = Path(function.__code__.co_filename).read_bytes()
-    variant = hashlib.sha256(f"{source_digest()} {cells!r} ".encode() + own_source).hexdigest()[:16]
+    variant = hashlib.sha256(f"{source_digest()} {cells!r} {options} ".encode() + own_source).hexdigest()[:16]
     function.__qualname__ += f"-{variant}"
     _kernels.add(function)
-    try:
-        return cast(F, njit(cache=True, **options, **_OPTIONS)(function))
-    except RuntimeError:  # no cache folder can be written to
-        return cast(F, njit(**options, **_OPTIONS)(function))
+    compiled = njit(**options, **_OPTIONS)(function)
+    if not config.DISABLE_JIT:
+        with contextlib.suppress(RuntimeError):  # no cache folder can be written to
+            compiled._cache = KernelCache(function)
+    return cast(F, compiled)
 
 
 class _Announcer(event.Listener):

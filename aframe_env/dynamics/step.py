@@ -210,13 +210,8 @@ def step_kernels(lanes: int = LANES) -> StepKernels:
     """Kernels for blocks of ``lanes`` rows (LANES for a batch, 1 for a single row)."""
     span = Span(lanes, 0, lanes)
 
-    @kernel
-    def step(blocks: Array, components: int, segments: int, records: Array) -> None:
-        for block in range(blocks.shape[0]):
-            control_step(blocks[block], components, segments, records, span)
-
     @parallel_kernel
-    def step_parallel(blocks: Array, components: int, segments: int, records: Array) -> None:
+    def step(blocks: Array, components: int, segments: int, records: Array) -> None:
         for block in prange(blocks.shape[0]):
             control_step(blocks[block], components, segments, records, span)
 
@@ -231,4 +226,4 @@ def step_kernels(lanes: int = LANES) -> StepKernels:
             for dof in range(6):
                 coordinates[i, dof] = deck_coordinate(blocks[i // lanes], dof, lanes, i % lanes)
 
-    return StepKernels(step, step_parallel, start, deck)
+    return StepKernels(step.serial, step, start, deck)

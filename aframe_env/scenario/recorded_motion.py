@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from aframe_env.memory import require_memory
 from aframe_env.scenario.motion import COORDINATES, FloatArray
 from aframe_env.text import read_csv
 from aframe_env.validation import InvalidValue, RecordNoiseWarning, require_number
@@ -256,6 +257,8 @@ def grid(duration: float, period: float) -> FloatArray:
         )
     # A duration that is a whole number of periods up to rounding has its last line too.
     count = math.floor(duration / period + 1e-6) + 1
+    # The table, and what it is put together from.
+    require_memory(f"{duration:g} s of recorded motion at steps of {period:g} s", 2 * count * 18 * 8)
     return np.asarray(np.minimum(np.arange(count) * period, duration))
 
 

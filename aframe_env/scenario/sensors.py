@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from aframe_env.dynamics.compiling import kernel
 from aframe_env.dynamics.random import normal
+from aframe_env.memory import require_memory
 from aframe_env.validation import InvalidValue, require_instance, require_number, shown
 
 FloatArray = npt.NDArray[np.float64]
@@ -100,6 +101,9 @@ class SensorBank:
         # A reading is the truth `delay` ago, interpolated between the control steps on either side.
         whole = math.floor(sensors.delay / control_period + 1e-9)
         self._weight = min(1.0, max(0.0, sensors.delay / control_period - whole))
+        require_memory(
+            f"num_envs = {rows} with sensors that are {sensors.delay:g} s late", 8 * rows * (whole + 2) * len(CHANNELS)
+        )
         self._memory = np.zeros((rows, whole + 2, len(CHANNELS)))
         """(rows, past control steps with the newest first, channels)."""
         self._error = np.zeros((rows, len(CHANNELS)))

@@ -290,10 +290,10 @@ def test_missing_pygame_names_the_extra_at_the_first_picture(mode: str, monkeypa
     env = gymnasium.make("AFrameHeave-v0", render_mode=mode)
     if mode == "rgb_array":
         env.reset(seed=0)
-    with pytest.raises(gymnasium.error.DependencyNotInstalled, match=r"pip install 'aframe-heave\[render\]'"):
+    with pytest.raises(gymnasium.error.DependencyNotInstalled, match=r'pip install "aframe-heave\[render\]"'):
         env.reset(seed=0) if mode == "human" else env.render()
     vector = gymnasium.make_vec("AFrameHeave-v0", num_envs=2, render_mode="rgb_array")
     vector.reset(seed=0)
     vector.step(np.zeros((2, 1), dtype=np.float32))
-    with pytest.raises(gymnasium.error.DependencyNotInstalled, match=r"pip install 'aframe-heave\[render\]'"):
+    with pytest.raises(gymnasium.error.DependencyNotInstalled, match=r'pip install "aframe-heave\[render\]"'):
         vector.render()

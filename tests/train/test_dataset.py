@@ -195,7 +195,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(root: Path, most: int) -> No
 
 def test_without_the_extra_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dataset, "find_spec", lambda name: None)
-    with pytest.raises(Exception, match=r"pip install 'aframe-heave\[data\]'"):
+    with pytest.raises(Exception, match=r'pip install "aframe-heave\[data\]"'):
         dataset.run(Options(), Console(quiet=True))
 
 

@@ -150,7 +150,7 @@ def test_values_out_of_range_are_refused() -> None:
 
 def test_without_the_extra_it_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(video, "find_spec", lambda name: None)
-    with pytest.raises(Exception, match=r"pip install 'aframe-heave\[video\]'"):
+    with pytest.raises(Exception, match=r'pip install "aframe-heave\[video\]"'):
         run(Options(out=tmp_path / "a.gif"), Console(quiet=True))
 
 

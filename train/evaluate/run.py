@@ -15,6 +15,7 @@ import aframe_env
 import agents
 from aframe_env import task
 from aframe_env.config import TaskConfig
+from aframe_env.memory import require_memory
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_integer
 from agents.control.optimum import saturating
@@ -22,7 +23,7 @@ from agents.drives.optimisation import OptimisedDrive
 from agents.drives.tuned import TUNED
 from agents.policy import Knowledge, Policy
 from agents.registry import DRUM_STILL, OPTIMUM, BuildContext, PolicySpec, Spread, as_spec, choose, choose_all, in_turn
-from agents.rollout import Episodes, held_out_scenarios, run
+from agents.rollout import Episodes, held_out_scenarios, history_bytes, run
 from train.evaluate.statistics import Entry, Mask, Row, compare, compare_families
 from train.evaluate.tables import rich_table, write_comparison
 from train.shared.job_store import JOBS, JobStore, version_of
@@ -152,6 +153,10 @@ def run_all(
     Worker processes import the calling script: there the call has to stand below ``if __name__ == "__main__":``.
     """
     config = held_out.config
+    chosen = (DRUM_STILL, *(c for c in specs if c.name != DRUM_STILL.name))
+    everything = range(held_out.number)
+    count = sum(len(everything[: held_out.privileged] if c.for_each_scenario else everything) for c in chosen)
+    require_memory(f"{count} episodes of {config.steps} control steps", count * history_bytes(config.steps))
     scenarios = held_out_scenarios(config.source, held_out.number)
     first = scenarios[: held_out.privileged]
     version = version_of(aframe_env, agents)
@@ -167,7 +172,6 @@ def run_all(
             console=console,
         ) as progress,
     ):
-        chosen = (DRUM_STILL, *(c for c in specs if c.name != DRUM_STILL.name))
         if where.asked_for:
             elsewhere = [
                 _Part(spec.text, spec.name, spec.digest, config, scenarios[block.start : block.stop], block.start)

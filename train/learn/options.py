@@ -10,7 +10,7 @@ from typing import Literal
 from aframe_env.config import TaskConfig
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
 from agents.learned.features import ACTIONS, Action, FeatureConfig
-from agents.learned.interface import InterfaceConfig
+from agents.learned.interface import InterfaceConfig, LearnerFeatures
 from train.evaluate.run import HeldOut
 from train.shared.jobs import Where
 from train.shared.run_folder import RunOptions
@@ -118,6 +118,11 @@ class LearningOptions(RunOptions, Where):
     def features(self) -> FeatureConfig:
         """What the agent's features are made for."""
         return FeatureConfig.of(self.config, self.action)
+
+    @property
+    def width(self) -> int:
+        """Fewest numbers of a row's observation; scenarios of ``practice`` tell the critic more."""
+        return len(LearnerFeatures(1, self.features, privileged=self.interface.privileged).names)
 
     @cached_property
     def interface(self) -> InterfaceConfig:

@@ -8,6 +8,7 @@ from typing import Any, Final, Literal
 from stable_baselines3 import PPO
 from torch import nn
 
+from aframe_env.memory import require_memory
 from aframe_env.validation import require_choice, require_integer, require_number
 from train.learn.actor_critic import TwoPathPolicy
 from train.learn.learner import Learner, LearnerSpec, Range, Search
@@ -69,6 +70,12 @@ class CriticFirstPPO(PPO):
         super().train()
 
 
+def check(options: Options) -> None:
+    """Raise where a rollout does not fit into memory."""
+    kept = options.n_steps * options.n_envs
+    require_memory(f"--n-steps {options.n_steps} of --n-envs {options.n_envs}", 4 * kept * (options.width + 7))
+
+
 def build(options: Options) -> Learner:
     """The learner and its rows."""
     rows = make_rows(options)
@@ -110,6 +117,7 @@ SPEC: Final = LearnerSpec(
     description="Train a PPO agent to hold the load still, then compare it with the paper's drives.",
     options=Options,
     build=build,
+    check=check,
     search=Search(
         {
             "learning_rate": Range(2e-4, 4e-3, logarithmic=True),

@@ -49,4 +49,5 @@ SPEC: Final = LearnerSpec(
     description="Train a PPO agent to correct predictive control, then compare it with the paper's drives.",
     options=Options,
     build=ppo.build,
+    check=ppo.check,
 )

@@ -7,6 +7,7 @@ from typing import Final
 
 from stable_baselines3 import SAC
 
+from aframe_env.memory import require_memory
 from aframe_env.validation import require_integer, require_number
 from train.learn.actor_critic import TwoPathSACPolicy
 from train.learn.learner import Learner, LearnerSpec, Range, Search
@@ -57,6 +58,12 @@ class Options(LearningOptions):
         require_integer("learning_starts", self.learning_starts, low=0, high=10**9)
 
 
+def check(options: Options) -> None:
+    """Raise where the replay does not fit into memory."""
+    kept = options.replay // options.n_envs * options.n_envs
+    require_memory(f"--replay {options.replay}", kept * 4 * (2 * options.width + 4))
+
+
 def build(options: Options) -> Learner:
     """The learner and its rows."""
     rows = make_rows(options)
@@ -92,6 +99,7 @@ SPEC: Final = LearnerSpec(
     description="Train a SAC agent to hold the load still, then compare it with the paper's drives.",
     options=Options,
     build=build,
+    check=check,
     search=Search(
         {
             "learning_rate": Range(2e-4, 4e-3, logarithmic=True),

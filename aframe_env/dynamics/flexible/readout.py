@@ -7,16 +7,15 @@ Reactions are R = Pᵀ(K q + L q̇ - f), linear in the modes and in what acts on
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import cache
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 from numba import prange
 
 from aframe_env.dynamics.blocks import nine
-from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar
+from aframe_env.dynamics.compiling import SpreadKernel, parallel_kernel, scalar
 from aframe_env.dynamics.flexible import layout as flex
 
 Array = npt.NDArray[np.float64]
@@ -117,14 +116,12 @@ def largest_rotation(frame: Array, table: Array, first: int, lanes: int, j: int)
 
 
 @cache
-def readout_kernel(lanes: int, parallel: bool) -> Callable[[Array, Array, Array], None]:
+def readout_kernel(lanes: int) -> SpreadKernel:
     """Kernel (frames, tables, results (N, READOUTS)) that reads the rows' frames out."""
-    compile_as = parallel_kernel if parallel else kernel
-    loop: Any = prange if parallel else range
 
-    @compile_as
+    @parallel_kernel
     def readout(frames: Array, tables: Array, results: Array) -> None:
-        for block in loop(frames.shape[0]):
+        for block in prange(frames.shape[0]):
             sums = np.empty(6 * int(tables[0, SPRINGS]))
             for j in range(lanes):
                 if block * lanes + j < results.shape[0]:

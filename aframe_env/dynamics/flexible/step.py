@@ -178,15 +178,8 @@ class FlexibleKernels(NamedTuple):
 def flexible_kernels(lanes: int = LANES) -> FlexibleKernels:
     """Kernels for blocks of ``lanes`` rows (LANES for a batch, 1 for a single row)."""
 
-    @kernel
-    def step(blocks: Array, frames: Array, tables: Array, components: int, segments: int, records: Array) -> None:
-        for block in range(blocks.shape[0]):
-            control_step(blocks[block], frames[block], tables, components, segments, records, lanes)
-
     @parallel_kernel
-    def step_parallel(
-        blocks: Array, frames: Array, tables: Array, components: int, segments: int, records: Array
-    ) -> None:
+    def step(blocks: Array, frames: Array, tables: Array, components: int, segments: int, records: Array) -> None:
         for block in prange(blocks.shape[0]):
             control_step(blocks[block], frames[block], tables, components, segments, records, lanes)
 
@@ -195,4 +188,4 @@ def flexible_kernels(lanes: int = LANES) -> FlexibleKernels:
         for block in range(blocks.shape[0]):
             start_rows(blocks[block], frames[block], tables, comoving, lanes)
 
-    return FlexibleKernels(step, step_parallel, start)
+    return FlexibleKernels(step.serial, step, start)
