@@ -84,6 +84,16 @@ def require_number(
         raise InvalidValue(f"{name} = {shown(value)} {unit}".rstrip() + f": must be in {allowed}")
 
 
+def require_zero_or_number(name: str, value: Any, unit: str, *, low: float, high: float) -> None:
+    """Raise unless ``value`` is 0, for none, or a number in [low, high]."""
+    if _is_one_of(_NUMBERS, value) and value == 0:
+        return
+    try:
+        require_number(name, value, unit, low=low, high=high)
+    except InvalidValue as error:
+        raise InvalidValue(str(error).replace("must be", "must be 0, or", 1)) from None
+
+
 def require_integer(name: str, value: Any, *, low: int, high: int) -> None:
     """Raise unless ``value`` is an integer in [low, high]."""
     if not _is_one_of(_INTEGERS, value):

@@ -9,12 +9,21 @@ from typing import Any, Final, Literal
 
 from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.scenario.motion import HarmonicMotion, ShipMotion, has_components, is_tabled
-from aframe_env.validation import InvalidValue, require_choice, require_instance, require_number, shown
+from aframe_env.validation import (
+    InvalidValue,
+    require_choice,
+    require_instance,
+    require_number,
+    require_zero_or_number,
+    shown,
+)
 
 Initial = Literal["comoving", "rest"]
 INITIALS: tuple[str, ...] = ("comoving", "rest")
 LEAST_MASS: Final = 1e-3
 """Least mass of a load, kg."""
+LEAST_RAMP: Final = 1e-3
+"""Shortest build-up that is one, s."""
 FASTEST_BOBBING: Final = 1e4
 """Greatest angular frequency of a load bobbing on its rope, rad/s: the inner step follows it."""
 FASTEST_DECAY: Final = 1e6
@@ -48,7 +57,7 @@ class Scenario:
         require_number("target_level", self.target_level, "m", low=-1e5, high=1e5)
         require_number("rope_damping", self.rope_damping, "N s/m", low=0.0, high=1e8)
         require_choice("initial", self.initial, INITIALS)
-        require_number("ramp", self.ramp, "s", low=0.0, high=1e4)
+        require_zero_or_number("ramp", self.ramp, "s", low=LEAST_RAMP, high=1e4)
         require_number("gravity", self.gravity, "m/s²", low=1e-3, high=100.0)
         least, most = self.crane.winch.min_rope_length, self.crane.winch.max_rope_length
         pulley = self.crane.pulley_position[2]

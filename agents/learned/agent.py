@@ -106,7 +106,11 @@ class LearnedPolicy(OnFeatures):
 
 
 def serialise(actor: Actor) -> bytes:
-    """Weights as the bytes of a safetensors file."""
+    """Weights as the bytes of a safetensors file. Raises ``InvalidValue`` for weights that are no numbers."""
+    if not all(torch.isfinite(weights).all() for weights in actor.state_dict().values()):
+        raise InvalidValue(
+            "the network's weights are not finite: the training has diverged; try a smaller learning rate"
+        )
     return save_tensors({k: v.contiguous() for k, v in actor.state_dict().items()})
 
 

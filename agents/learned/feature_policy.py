@@ -57,7 +57,7 @@ class OnFeatures(ABC):
             inputs = self._features.start(observation, self._cranes)
         else:
             inputs = self._features.advance(observation)
-        return self._features.command(self._output(inputs))
+        return self._features.command(self._finite_output(inputs))
 
     def overrule(self, command: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Look on while somebody else gives the commands (N,) rad/s in place of those of the last ``act``.
@@ -99,8 +99,14 @@ class OnFeatures(ABC):
             begun = np.flatnonzero(_starts(episode_start, count))
             if len(begun):
                 inputs[begun] = memory.start(rows[begun], [crane] * len(begun), begun)
-        actions = memory.command(self._output(inputs)).astype(np.float32)[:, None]
+        actions = memory.command(self._finite_output(inputs)).astype(np.float32)[:, None]
         return (actions[0] if checked.ndim == 1 else actions), memory
+
+    def _finite_output(self, inputs: Float32Array) -> FloatArray:
+        output = self._output(inputs)
+        if not np.isfinite(output).all():
+            raise InvalidValue(f"{self.name} gave an output that is not finite: must be in [-1, 1]")
+        return output
 
     def _checked(self, observation: Any) -> Float32Array:
         """The observation, (K,) or (N, K). Raises InvalidValue where it is neither."""
@@ -146,6 +152,4 @@ class FeaturePolicy(OnFeatures):
             output = output[:, 0]
         if output.shape != (len(inputs),):
             raise InvalidValue(f"{self.name} gave shape {output.shape}: must be ({len(inputs)},), one output a row")
-        if not np.isfinite(output).all():
-            raise InvalidValue(f"{self.name} gave an output that is not finite: must be in [-1, 1]")
         return output

@@ -22,7 +22,7 @@ from aframe_env.scenario.sea import SPECTRA, Sea, SeaMotion
 from aframe_env.scenario.sensors import CHANNELS, Channel
 from aframe_env.scenario.vessel import Vessel
 
-_RANGE: Final = re.compile(r"must be (?:a number |an integer )?in ([(\[])(\S+), (\S+?)([)\]])")
+_RANGE: Final = re.compile(r"must be (0, or )?(?:a number |an integer )?in ([(\[])(\S+), (\S+?)([)\]])")
 MOST_CHANGES: Final = 4
 """Most fields of a part that leave their defaults at once."""
 
@@ -34,13 +34,15 @@ class Interval:
     low: float
     high: float
     integer: bool
+    zero: bool
+    """Whether 0, for none, is a value beside them."""
 
     @property
     def values(self) -> st.SearchStrategy[Any]:
         """Its ends, and what lies between, by magnitude where it spans several."""
         if self.integer:
             return st.one_of(st.sampled_from([int(self.low), int(self.high)]), st.integers(int(self.low), self._some))
-        ends = st.sampled_from([self.low, self.high])
+        ends = st.sampled_from([self.low, self.high, *((0.0,) if self.zero else ())])
         between = st.floats(self.low, self.high)
         if self.low > 0.0 and self.high > 100.0 * self.low:
             between = st.floats(math.log(self.low), math.log(self.high)).map(
@@ -62,13 +64,14 @@ def interval(make: Callable[..., object], name: str) -> Interval | None:
         found = _RANGE.search(str(error))
         if found is None:
             return None
-        left, low, high, right = found.groups()
+        zero, left, low, high, right = found.groups()
         # An open end is no value of the range: the nearest float is.
         ends = float(low), float(high)
         return Interval(
             math.nextafter(ends[0], math.inf) if left == "(" else ends[0],
             math.nextafter(ends[1], -math.inf) if right == ")" else ends[1],
             "an integer in" in str(error),
+            bool(zero),
         )
     raise AssertionError(f"{name} takes NaN")
 

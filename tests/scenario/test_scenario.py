@@ -119,7 +119,7 @@ def test_scenario_option_is_the_episode() -> None:
         (lambda: Scenario(target_level=-5e3), r"target_level = -5000.0 m needs .* the winch's limits"),
         (lambda: Scenario(target_level=-math.inf), "target_level = -inf m: must be in"),
         (lambda: Scenario(initial="moving"), "initial = 'moving': must be one of 'comoving', 'rest'"),
-        (lambda: Scenario(ramp=-1.0), r"ramp = -1.0 s: must be in \[0, 10000\] s"),
+        (lambda: Scenario(ramp=-1.0), r"ramp = -1.0 s: must be 0, or in \[0.001, 10000\] s"),
         (lambda: Scenario(gravity=0.0), r"gravity = 0.0 m/s²: must be in \[0.001, 100\] m/s²"),
         (lambda: Scenario(crane=None), "crane = None: must be a Crane"),
         (lambda: Scenario(motion=2.0), "motion = 2.0: must be a ship motion"),

@@ -150,7 +150,7 @@ def run_all(
     What is finished, each policy's run over a block of scenarios and each drive that one needs, is kept in the file
     ``jobs``, and not computed again. Drives are optimised ``where``; policies run there too where it was asked for,
     and otherwise in this process, which has not to start others for that.
-    Worker processes import the calling script: there the call has to stand below ``if __name__ == "__main__":``.
+    Worker processes import the calling script: there the call has to stand where an import does not reach it.
     """
     config = held_out.config
     chosen = (DRUM_STILL, *(c for c in specs if c.name != DRUM_STILL.name))
