@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
+import gymnasium
 import pytest
 
 from aframe_env import InvalidValue, ScenarioDistribution, TaskConfig
@@ -21,7 +21,7 @@ def test_it_gives_no_command(diverged: LearnedPolicy) -> None:
     with pytest.raises(InvalidValue, match="residual PPO gave an output that is not finite"):
         run(diverged, drawn_scenarios(ScenarioDistribution(), 0, 2), TaskConfig(episode_duration=1.0))
     with pytest.raises(InvalidValue, match="residual PPO gave an output that is not finite"):
-        diverged.predict(np.zeros(14, dtype=np.float32))
+        diverged.predict(gymnasium.make("AFrameHeave-v0").reset(seed=0)[0])
 
 
 def test_it_is_not_written(diverged: LearnedPolicy) -> None:
