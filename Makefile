@@ -40,6 +40,8 @@ results: .venv/installed-test
 	$(BIN)/python -m train.ppo --action predictive --observation sensors --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/predictive-ppo-sensors
 	$(BIN)/python -m train.sac --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/sac
 	$(BIN)/python -m train.sac --observation sensors --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/sac-sensors
+	$(BIN)/python -m train.ppo --action speed --timesteps 3000000 --selected-by 100 --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/ppo-speed
+	$(BIN)/python -m train.sac --action speed --selected-by 100 --seeds 5 --eval-scenarios 0 --overwrite --out results/agents/sac-speed
 	$(BIN)/python -m train.tune_control --scenarios 200 --evaluations 24 --overwrite --out results/control
 	$(BIN)/python -m train.drives --case paper --check rfem --overwrite --out results/drives-paper
 	$(BIN)/python -m train.drive_map --overwrite --out results/drive-map

@@ -40,6 +40,8 @@ class Options(RunOptions, Where, HeldOut):
         "sac",
         "ppo-sensors",
         "sac-sensors",
+        "ppo-speed",
+        "sac-speed",
         "drive-map",
         "drive-map:clock",
         *AFTER_TRAINING,

@@ -46,7 +46,7 @@ def committed():
 
 
 def test_all_seeds_are_there():
-    assert len(POLICIES) == 6 * 5 + 9
+    assert len(POLICIES) == 8 * 5 + 9
     assert {spec.name for spec in POLICIES} <= set(committed())
 
 
