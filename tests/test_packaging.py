@@ -74,7 +74,7 @@ print(agents.drives.map.load().shape, agents.registry.choose("drive-map:clock").
         agent = agents.load(folder / "seed-0")
         expected.append(f"{folder.name} {agent.card.sha256} ['{agent.name}']")
     assert loaded == expected
-    assert len(expected) == 6
+    assert len(expected) == 8
     assert drive_map == "(5, 8, 5, 8) drive map by the clock"
     assert not list(tmp_path.iterdir())
 
