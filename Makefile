@@ -46,7 +46,7 @@ results: .venv/installed-test
 	$(BIN)/python -m train.drives --case paper --check rfem --overwrite --out results/drives-paper
 	$(BIN)/python -m train.drive_map --overwrite --out results/drive-map
 	$(BIN)/python -m train.optimisers --overwrite --out results/optimisers
-	$(BIN)/python -m train.evaluate --scenarios 1000 --privileged 200 --overwrite --out results/comparison
+	$(BIN)/python -m train.evaluate --scenarios 1000 --workers 2 --overwrite --out results/comparison
 	$(BIN)/python -m train.evaluate --model rfem --privileged 0 --overwrite --out results/comparison-full-model --policies \
 		results/agents/ppo results/agents/sac results/agents/ppo-sensors results/agents/sac-sensors \
 		"feed-forward + feedback (state)" "feed-forward + feedback"
