@@ -19,6 +19,8 @@ Vector = tuple[float, float, float]
 
 GRAVITY = 9.81
 """Acceleration of gravity, m/s² (the reference crane's figure)."""
+LEAST_ARM = 1e-4
+"""Least lever arm of the servomotors about the feet, m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +47,18 @@ class Frame:
         require_number("servomotor_height", self.servomotor_height, "m", low=1e-3, high=self.height)
         require_number("servomotor_deck_x", self.servomotor_deck_x, "m", low=-1e4, high=1e4)
         require_instance("structure", self.structure, FrameStructure)
+        if self.servomotor_arm < LEAST_ARM:
+            raise InvalidValue(
+                f"servomotor_deck_x = {self.servomotor_deck_x!r} m: the servomotors' line passes the feet at "
+                f"{self.servomotor_arm:g} m: must be at least {LEAST_ARM:g} m, or they cannot hold the frame"
+            )
+
+    @property
+    def servomotor_arm(self) -> float:
+        """Lever arm of the servomotors about the feet, m."""
+        height = self.servomotor_height * math.cos(self.luffing_angle)
+        along = self.servomotor_height * math.sin(self.luffing_angle) - self.servomotor_deck_x
+        return abs(self.servomotor_deck_x) * height / math.hypot(along, height)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -35,12 +35,13 @@ COMMANDS: Final = {
 }
 """Small runs of every command that keeps its finished jobs."""
 MEASURED: Final = {
+    "train.evaluate": ("report.html",),
     "train.optimisers": ("comparison.md", "comparison.json"),
     "train.drives": ("notes.md", "summary.csv", "summary.json"),
     "train.drive_map": ("notes.md",),
     "train.verify": (),
 }
-"""Files with seconds in them; of JSON all else is looked at."""
+"""Files with seconds, or the command line, in them; of JSON all else is looked at."""
 _PATIENCE: Final = 1800.0
 """Seconds after which a study is no longer waited for."""
 

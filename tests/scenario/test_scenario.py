@@ -184,3 +184,11 @@ def test_scenario_option_is_the_episode() -> None:
 def test_bad_input_names_value_range_and_unit(make: Any, message: str) -> None:
     with pytest.raises(InvalidValue, match=message):
         make()
+
+
+def test_servomotors_without_a_lever_are_refused():
+    with pytest.raises(InvalidValue, match=r"servomotor_deck_x = 0.0 m: the servomotors' line passes the feet at 0 m"):
+        Frame(servomotor_deck_x=0.0)
+    # Upright, it is the cylinder's height over its base times its length.
+    frame = Frame(luffing_angle=0.0, servomotor_height=3.0, servomotor_deck_x=-4.0)
+    assert frame.servomotor_arm == pytest.approx(3.0 * 4.0 / 5.0)

@@ -7,6 +7,7 @@ import errno
 import json
 import os
 import platform
+import re
 import shlex
 import sys
 import tempfile
@@ -41,6 +42,8 @@ _WHERE_AND_HOW: Final = (
     "trials",
 )
 """Options that do not change what is computed, or only how much."""
+_TEMPORARY: Final = re.compile(r"\..+\.[a-z0-9_]{8}\.[a-z0-9]+")
+"""Name of a temporary file of ``write_atomically``."""
 _LOCKS: Final[dict[Path, int]] = {}
 """Handles of the folders that this process has locked."""
 REPORTED_PACKAGES = ("gymnasium", "stable-baselines3", "torch", "numpy", "scipy", "numba")
@@ -192,6 +195,10 @@ def open_run(options: RunOptions, name: str, *, goes_on: bool = False) -> Run:
     if not taken_up:
         new_folder(folder, overwrite=options.overwrite or _hardly_begun(folder))
     _lock(folder)
+    if taken_up:
+        for left in folder.iterdir():
+            if _TEMPORARY.fullmatch(left.name):  # of a file that was being written when the run was killed
+                left.unlink()
     return Run(folder, command_line(name), taken_up)
 
 

@@ -71,6 +71,16 @@ def test_a_run_that_was_killed_before_it_was_recorded_begins_anew(tmp_path):
         open_run(options, "train.drives", goes_on=True)
 
 
+def test_a_run_that_goes_on_sweeps_up_what_a_kill_left_half_written(tmp_path):
+    options = RunOptions(out=tmp_path / "run")
+    open_run(options, "train.drives", goes_on=True).record(options)
+    for name in (".summary.k3_x9q1z.json", "mine.json", ".hidden"):
+        (tmp_path / "run" / name).write_text("{")
+    assert open_run(options, "train.drives", goes_on=True).taken_up
+    left = {path.name for path in (tmp_path / "run").iterdir()}
+    assert left == {"config.toml", "run.json", "mine.json", ".hidden"}
+
+
 def test_files(tmp_path):
     path = tmp_path / "x.json"
     assert new_file(path) == path
