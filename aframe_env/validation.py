@@ -68,30 +68,23 @@ def require_number(
     low: float = -math.inf,
     high: float = math.inf,
     low_open: bool = False,
+    or_zero: bool = False,
 ) -> None:
-    """Raise unless ``value`` is a finite real number in [low, high] (or (low, high])."""
+    """Raise unless ``value`` is a finite real number in [low, high] (or (low, high]), or 0 where ``or_zero``."""
     if type(value) is float and low < value < high:
         return
-    allowed = f"{_interval(low, high, low_open)} {unit}".rstrip()
+    allowed, must_be = f"{_interval(low, high, low_open)} {unit}".rstrip(), "must be 0, or" if or_zero else "must be"
     if not _is_one_of(_NUMBERS, value):
-        raise InvalidValue(f"{name} = {shown(value)}: must be a number in {allowed}")
+        raise InvalidValue(f"{name} = {shown(value)}: {must_be} a number in {allowed}")
     try:
         number = float(value)
     except OverflowError:
         number = math.inf
+    if or_zero and number == 0.0:
+        return
     below = number <= low if low_open else number < low
     if not math.isfinite(number) or below or number > high:
-        raise InvalidValue(f"{name} = {shown(value)} {unit}".rstrip() + f": must be in {allowed}")
-
-
-def require_zero_or_number(name: str, value: Any, unit: str, *, low: float, high: float) -> None:
-    """Raise unless ``value`` is 0, for none, or a number in [low, high]."""
-    if _is_one_of(_NUMBERS, value) and value == 0:
-        return
-    try:
-        require_number(name, value, unit, low=low, high=high)
-    except InvalidValue as error:
-        raise InvalidValue(str(error).replace("must be", "must be 0, or", 1)) from None
+        raise InvalidValue(f"{name} = {shown(value)} {unit}".rstrip() + f": {must_be} in {allowed}")
 
 
 def require_integer(name: str, value: Any, *, low: int, high: int) -> None:

@@ -32,6 +32,8 @@ class StressPoint(NamedTuple):
 
 _MOMENT: Final = ("m⁴", 1e-12, 1e6)
 """Unit and range of a second moment."""
+_RANGES: Final = {"area": ("m²", 1e-6, 1e3), "shear_factor_2": ("", 1.0, 1e3), "shear_factor_3": ("", 1.0, 1e3)}
+"""Units and ranges of what is none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,17 +85,11 @@ class GivenSection:
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            if item.name in ("polar_moment", "stress_points"):
+            value = getattr(self, item.name)
+            if item.name == "stress_points" or (item.name == "polar_moment" and value is None):
                 continue
-            unit, low, high = {
-                "area": ("m²", 1e-6, 1e3),
-                "shear_factor_2": ("", 1.0, 1e3),
-                "shear_factor_3": ("", 1.0, 1e3),
-            }.get(item.name, _MOMENT)
-            require_number(item.name, getattr(self, item.name), unit, low=low, high=high)
-        if self.polar_moment is not None:
-            unit, low, high = _MOMENT
-            require_number("polar_moment", self.polar_moment, unit, low=low, high=high)
+            unit, low, high = _RANGES.get(item.name, _MOMENT)
+            require_number(item.name, value, unit, low=low, high=high)
         require_instance("stress_points", self.stress_points, tuple)
         for index, point in enumerate(self.stress_points):
             require_vector(f"stress_points[{index}]", point, "m, m, 1/m², 1/m² and 1/m³", size=5, low=-1e12, high=1e12)

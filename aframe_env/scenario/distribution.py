@@ -16,14 +16,7 @@ from aframe_env.scenario.scenario import LEAST_MASS, LEAST_RAMP, Scenario
 from aframe_env.scenario.sea import FULL_TURN, Sea, SeaMotion, dnv_gamma
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.scenario.vessel import Vessel
-from aframe_env.validation import (
-    InvalidValue,
-    require_instance,
-    require_integer,
-    require_number,
-    require_zero_or_number,
-    shown,
-)
+from aframe_env.validation import InvalidValue, require_instance, require_integer, require_number, shown
 
 Range = float | tuple[float, float]
 """One exact value, or the interval that a value is drawn from uniformly."""
@@ -99,7 +92,7 @@ class ScenarioDistribution:
             _require_range("gamma", self.gamma, "", 1.0, 10.0)
         elif self.gamma != "dnv":
             raise InvalidValue(f"gamma = {shown(self.gamma)}: must be 'dnv', a number or a tuple in [1, 10]")
-        require_zero_or_number("ramp", self.ramp, "s", low=LEAST_RAMP, high=1e4)
+        require_number("ramp", self.ramp, "s", low=LEAST_RAMP, high=1e4, or_zero=True)
         _require_range("load_mass", self.load_mass, "kg", LEAST_MASS, 1e7)
         _require_range("rope_length", self.rope_length, "m", 0.0, 1e5, low_open=True)
         _require_range("rope_damping_ratio", self.rope_damping_ratio, "of critical", 0.0, 1.0)

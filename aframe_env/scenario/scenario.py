@@ -9,14 +9,7 @@ from typing import Any, Final, Literal
 
 from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.scenario.motion import HarmonicMotion, ShipMotion, has_components, is_tabled
-from aframe_env.validation import (
-    InvalidValue,
-    require_choice,
-    require_instance,
-    require_number,
-    require_zero_or_number,
-    shown,
-)
+from aframe_env.validation import InvalidValue, require_choice, require_instance, require_number, shown
 
 Initial = Literal["comoving", "rest"]
 INITIALS: tuple[str, ...] = ("comoving", "rest")
@@ -57,7 +50,7 @@ class Scenario:
         require_number("target_level", self.target_level, "m", low=-1e5, high=1e5)
         require_number("rope_damping", self.rope_damping, "N s/m", low=0.0, high=1e8)
         require_choice("initial", self.initial, INITIALS)
-        require_zero_or_number("ramp", self.ramp, "s", low=LEAST_RAMP, high=1e4)
+        require_number("ramp", self.ramp, "s", low=LEAST_RAMP, high=1e4, or_zero=True)
         require_number("gravity", self.gravity, "m/s²", low=1e-3, high=100.0)
         least, most = self.crane.winch.min_rope_length, self.crane.winch.max_rope_length
         pulley = self.crane.pulley_position[2]

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from aframe_env.dynamics.compiling import kernel
 from aframe_env.dynamics.random import normal
 from aframe_env.memory import require_memory
-from aframe_env.validation import InvalidValue, require_instance, require_number, require_zero_or_number, shown
+from aframe_env.validation import InvalidValue, require_instance, require_number, shown
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class Channel:
     def __post_init__(self) -> None:
         for name in ("noise", "relative_noise"):
             require_number(name, getattr(self, name), "of the channel's unit", low=0.0, high=1e9)
-        require_zero_or_number("resolution", self.resolution, "of the channel's unit", low=1e-12, high=1e9)
+        require_number("resolution", self.resolution, "of the channel's unit", low=1e-12, high=1e9, or_zero=True)
         require_number("correlation_time", self.correlation_time, "s", low=0.0, high=1e6)
         require_number("period", self.period, "s", low=0.0, high=1e4)
 

@@ -134,7 +134,6 @@ def motions(draw: st.DrawFn) -> ShipMotion:
 def scenarios(draw: st.DrawFn) -> Scenario:
     """Scenarios from all over the ranges."""
     crane, motion = draw(cranes()), draw(motions())
-    choices = {"initial": st.sampled_from(INITIALS)}
     length = draw(st.one_of(st.just(300.0), st.floats(math.log(1e-2), math.log(1e5)).map(math.exp)))
     start = made(
         lambda: Scenario(
@@ -144,9 +143,10 @@ def scenarios(draw: st.DrawFn) -> Scenario:
             target_level=crane.pulley_position[2] - length,
         )
     )
-    names = [name for name in intervals_of(start) if draw(st.booleans())]
-    changes = {name: draw(intervals_of(start)[name].values) for name in names if name != "target_level"}
-    changes |= {name: draw(values) for name, values in choices.items()}
+    ranges = intervals_of(start)
+    names = [name for name in ranges if draw(st.booleans())]
+    changes = {name: draw(ranges[name].values) for name in names if name != "target_level"}
+    changes["initial"] = draw(st.sampled_from(INITIALS))
     scenario: Scenario = made(lambda: replace(start, **changes))
     return scenario
 
