@@ -174,10 +174,10 @@ def run_all(
     ):
         if where.asked_for:
             elsewhere = [
-                _Part(spec.text, spec.name, spec.digest, config, scenarios[block.start : block.stop], block.start)
+                part
                 for spec in chosen
                 if spec.text and not spec.for_each_scenario
-                for block in _blocks(len(scenarios))
+                for part in _parts(spec, config, scenarios)
             ]
             run_jobs(
                 _run_elsewhere, elsewhere, _Part.key, store=ran, where=where, progress=progress, description="policies"
@@ -186,15 +186,14 @@ def run_all(
             mine = first if spec.for_each_scenario else scenarios
             if not mine:
                 continue
-            blocks = _blocks(len(mine))
-            bar = progress.add_task(spec.name, total=len(blocks) * config.steps)
-            parts = []
-            for i, block in enumerate(blocks):
-                part = _Part(spec.text, spec.name, spec.digest, config, mine[block.start : block.stop], block.start)
-                parts.append(ran.get(part.key(), partial(_run_here, spec, part, drives, where, progress, bar)))
-                progress.update(bar, completed=(i + 1) * config.steps)
-            episodes = Episodes.joined([part.episodes for part in parts])
-            entries.append(Entry(spec.name, parts[0].knows, episodes, spec.text))
+            parts = _parts(spec, config, mine)
+            bar = progress.add_task(spec.name, total=len(parts) * config.steps)
+            found = []
+            for part in parts:
+                found.append(ran.get(part.key(), partial(_run_here, spec, part, drives, where, progress, bar)))
+                progress.update(bar, completed=len(found) * config.steps)
+            episodes = Episodes.joined([each.episodes for each in found])
+            entries.append(Entry(spec.name, found[0].knows, episodes, spec.text))
     return Comparison(tuple(entries), tuple(scenarios), config)
 
 
@@ -222,8 +221,12 @@ class _Part:
         return _Ran(policy.knows, episodes)
 
 
-def _blocks(count: int) -> list[range]:
-    return [range(begin, min(begin + BLOCK, count)) for begin in range(0, count, BLOCK)]
+def _parts(spec: PolicySpec, config: TaskConfig, scenarios: Sequence[Scenario]) -> list[_Part]:
+    """Runs of a policy over all scenarios, a block each."""
+    return [
+        _Part(spec.text, spec.name, spec.digest, config, scenarios[first : first + BLOCK], first)
+        for first in range(0, len(scenarios), BLOCK)
+    ]
 
 
 def _run_elsewhere(part: _Part) -> _Ran:

@@ -41,7 +41,7 @@ class Where:
 
     @property
     def asked_for(self) -> bool:
-        """Whether more than one process of this machine was asked for in words."""
+        """Whether a cluster, or more than one process of this machine, was asked for in words."""
         return self.cluster is not None or (self.workers or 1) > 1
 
     def outcomes(
