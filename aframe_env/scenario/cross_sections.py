@@ -9,7 +9,7 @@ moment of area *about* axis 2 (bending that displaces along 3); ``shear_factor_2
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Final, NamedTuple, TypeAlias
 
 from aframe_env.validation import InvalidValue, require_instance, require_number, require_vector, shown
@@ -30,10 +30,8 @@ class StressPoint(NamedTuple):
     """Shear stress for a unit torque, 1/m³."""
 
 
-_MOMENT: Final = ("m⁴", 1e-12, 1e6)
-"""Unit and range of a second moment."""
-_RANGES: Final = {"area": ("m²", 1e-6, 1e3), "shear_factor_2": ("", 1.0, 1e3), "shear_factor_3": ("", 1.0, 1e3)}
-"""Units and ranges of what is none."""
+_RADIUS_SQUARED: Final = 1e-8, 1e4
+"""Range of a moment over the area, m²: radii of gyration from 0.1 mm to 100 m."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,12 +82,14 @@ class GivenSection:
     """Points where stress is evaluated; empty: no stresses can be computed."""
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if item.name == "stress_points" or (item.name == "polar_moment" and value is None):
-                continue
-            unit, low, high = _RANGES.get(item.name, _MOMENT)
-            require_number(item.name, value, unit, low=low, high=high)
+        require_number("area", self.area, "m²", low=1e-6, high=1e3)
+        low, high = (self.area * ratio for ratio in _RADIUS_SQUARED)
+        for name in ("torsion_constant", "second_moment_2", "second_moment_3", "polar_moment"):
+            moment = getattr(self, name)
+            if name != "polar_moment" or moment is not None:
+                require_number(name, moment, f"m⁴ for area {self.area:g} m²", low=low, high=high)
+        for name in ("shear_factor_2", "shear_factor_3"):
+            require_number(name, getattr(self, name), "", low=1.0, high=1e3)
         require_instance("stress_points", self.stress_points, tuple)
         for index, point in enumerate(self.stress_points):
             require_vector(f"stress_points[{index}]", point, "m, m, 1/m², 1/m² and 1/m³", size=5, low=-1e12, high=1e12)

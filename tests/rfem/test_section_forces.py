@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -83,6 +84,10 @@ def test_von_mises_of_bending_and_of_torsion():
                 shear_factor_3=1.0,
             ),
             "shear_factor_2",
+        ),
+        (
+            lambda: replace(RectangularHollow(side_2=0.6, side_3=1.0, wall=0.025).given(), second_moment_2=1e-12),
+            r"second_moment_2 = 1e-12 m⁴ for area 0.0775 m².*\[7\.75e-10, 775\]",
         ),
     ],
 )
