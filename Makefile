@@ -47,9 +47,9 @@ results: .venv/installed-test
 	$(BIN)/python -m train.drive_map --overwrite --out results/drive-map
 	$(BIN)/python -m train.optimisers --overwrite --out results/optimisers
 	$(BIN)/python -m train.evaluate --scenarios 1000 --workers 2 --overwrite --out results/comparison
-	$(BIN)/python -m train.evaluate --model rfem --privileged 0 --overwrite --out results/comparison-full-model --policies \
-		results/agents/ppo results/agents/sac results/agents/ppo-sensors results/agents/sac-sensors \
-		"feed-forward + feedback (state)" "feed-forward + feedback"
+	$(BIN)/python -m train.evaluate --model rfem --privileged 0 --workers 2 --overwrite --out results/comparison-full-model \
+		--policies predictive-ppo ppo sac ppo-speed sac-speed predictive-ppo-sensors ppo-sensors sac-sensors \
+		"predictive control (state)" "predictive control" "feed-forward + feedback (state)" "feed-forward + feedback"
 	$(BIN)/python -m train.sensitivity --overwrite --out results/sensitivity
 	$(BIN)/python -m train.verify
 
