@@ -11,7 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.start import hang_load, inner_steps, longest_inner_step, write_lift
+from aframe_env.dynamics.start import (
+    hang_load,
+    hang_rope,
+    inner_steps,
+    longest_chain_step,
+    longest_inner_step,
+    write_heavy,
+    write_lift,
+)
 from aframe_env.dynamics.step import step_kernels
 from aframe_env.dynamics.wave_components import component_kernels
 from aframe_env.memory import require_memory
@@ -47,7 +55,17 @@ def timing(scenario: Scenario, control_period: float, max_inner_step: float | No
     segments = math.ceil(control_period / MAX_SEGMENT - 1e-9)
     segment = control_period / segments
     longest = max_inner_step or longest_inner_step(scenario.rope_frequency, scenario.rope_damping_rate)
+    if scenario.elements > 1:
+        longest = min(longest, _chain_step(scenario))
     return Timing(segments, segment, inner_steps(segment, longest))
+
+
+def _chain_step(scenario: Scenario) -> float:
+    """Longest stable step for the elements of a scenario's rope, s, with a tenth of its length wound up."""
+    rope = scenario.crane.rope
+    loss_time = scenario.total_rope_damping / scenario.rope_stiffness
+    element = 0.9 * scenario.lengths[0] / scenario.elements
+    return longest_chain_step(element, math.sqrt(rope.axial_stiffness / rope.mass_per_length), loss_time)
 
 
 class RecordTable:
@@ -217,6 +235,7 @@ class Engine:
         component_kernels().write(row, components.frequency, components.response, segments * times.segment)
         self._kernels_of_one.start(row[None], self._components, self._records.lines)
         hang_load(row, 1, 0, scenario.initial == "comoving")
+        hang_rope(row, 1, 0, scenario.initial == "comoving")
         self._kernels_of_one.start(row[None], self._components, self._records.lines)
         return row
 
@@ -299,11 +318,30 @@ def _fill_parameters(row: FloatArray, scenario: Scenario, times: Timing) -> None
         0,
         scenario.load_mass,
         scenario.target_level,
-        scenario.rope_damping,
+        scenario.total_rope_damping,
         scenario.free_length,
         winch.min_rope_length,
         winch.max_rope_length,
         times.substeps,
+    )
+    if scenario.is_light:
+        return
+    load, half_density = scenario.load, 0.5 * scenario.density
+    write_heavy(
+        row,
+        1,
+        0,
+        scenario.elements,
+        scenario.lengths[1],
+        (
+            rope.mass_per_length,
+            scenario.rope_weight,
+            half_density * rope.tangential_drag * math.pi * rope.solid_diameter,
+            scenario.total_rope_damping / scenario.rope_stiffness,
+        ),
+        (scenario.load_mass + load.added_mass_horizontal, scenario.load_mass + load.added_mass_vertical),
+        scenario.weight,
+        (half_density * load.drag_area_horizontal, half_density * load.drag_area_vertical),
     )
 
 

@@ -18,6 +18,13 @@ of the angle turned."""
 INNER_STEP_DECAY: Final = 1.0
 """Greatest decay of the load's bobbing by an overdamped rope in one inner step; RK4 is stable up to 2.78."""
 
+SHORT_ROPE: Final = 100.0
+"""Length below which a rope's own waves are too fast to matter, m: its first frequency is then right within 0.2 %."""
+LIGHT_ROPE: Final = 1e-3
+"""Mass of a rope, as a share of its load's, below which the same holds."""
+CHAIN_PHASE: Final = 2.4
+"""Greatest rate of a chain's fastest mode times the inner step; RK4 is stable up to some 2.6 in all directions."""
+
 
 def free_length(rope_length: float, drum_to_pulley: float, weight: float, axial_stiffness: float) -> float:
     """Unstretched length between drum and a load of ``weight`` N that hangs ``rope_length`` m below the pulley, m.
@@ -25,6 +32,48 @@ def free_length(rope_length: float, drum_to_pulley: float, weight: float, axial_
     ``drum_to_pulley`` in m, the rope's ``axial_stiffness`` E F in N.
     """
     return (rope_length + drum_to_pulley) / (1.0 + weight / axial_stiffness)
+
+
+def heavy_lengths(
+    rope_length: float, drum_to_pulley: float, weight: float, axial_stiffness: float, rope_weight: float
+) -> tuple[float, float]:
+    """Unstretched lengths of a rope of ``rope_weight`` N/m, below the pulley and from there to the drum, m.
+
+    The load's ``weight`` [N] hangs ``rope_length`` m below the pulley at rest; the strain grows with the rope above it.
+    """
+    softness = 1.0 / axial_stiffness
+    stretched = 1.0 + weight * softness
+    root = math.sqrt(stretched * stretched + 2.0 * rope_weight * softness * rope_length)
+    below = 2.0 * rope_length / (stretched + root)
+    return below, drum_to_pulley / (1.0 + (weight + rope_weight * below) * softness)
+
+
+def elements_of_rope(below: float, mass_per_length: float, load_mass: float) -> int:
+    """Elements of a rope with ``below`` m under the pulley.
+
+    They give its first two frequencies within 1 %, with loads of 20 t and more; no more of them where the inner step
+    would have to be shorter for them. One, with a third of the rope's mass at the load, where the rope is short or
+    light beside its load.
+    """
+    if below < SHORT_ROPE or mass_per_length * below < LIGHT_ROPE * load_mass:
+        return 1
+    if below < 190.0:
+        return 4 if below < 130.0 else 5
+    if below < 500.0:
+        return 6 if below < 350.0 else 7
+    return at.ELEMENTS_MOST
+
+
+def longest_chain_step(element: float, wave_speed: float, loss_time: float) -> float:
+    """Longest inner step [s] with which RK4 is stable for elements of ``element`` m.
+
+    ``wave_speed`` of the rope, √(E F/μ), in m/s; ``loss_time`` of its material in s. The chain's fastest mode has
+    2 c / l_e rad/s; damped beyond the critical it decays faster than it would swing.
+    """
+    fastest = 2.0 * wave_speed / element
+    over = 0.5 * loss_time * fastest
+    rate = fastest * (over + math.sqrt(over * over - 1.0)) if over > 1.0 else fastest
+    return CHAIN_PHASE / rate
 
 
 def critical_damping(stiffness: float, mass: float) -> float:
@@ -74,6 +123,56 @@ def write_lift(
     row[at.SUBSTEPS * lanes + j] = substeps
     row[at.INNER_STEP * lanes + j] = inner_step
     row[at.HALF_STEP_DECAY * lanes + j] = math.exp(-0.5 * inner_step / lag) if lag > 0.0 else 0.0
+
+
+def write_heavy(
+    row: Any,
+    lanes: int,
+    j: int,
+    elements: int,
+    drum_part: float,
+    rope: tuple[float, float, float, float],
+    inertia: tuple[float, float],
+    weight: float,
+    drag: tuple[float, float],
+) -> None:
+    """Write what a rope with mass and a load in water need beside ``write_lift`` into lane j.
+
+    ``elements`` of the rope; ``drum_part`` unstretched from drum to pulley, m; ``rope``: mass kg/m, weight N/m, drag
+    N s²/m³, loss time s; the load's ``inertia`` [kg] and ``drag`` [N s²/m²], horizontal and vertical; its ``weight``, N.
+    """
+    row[at.ELEMENTS * lanes + j] = elements
+    row[at.DRUM_PART * lanes + j] = drum_part
+    row[at.ROPE_MASS * lanes + j] = rope[0]
+    row[at.ROPE_WEIGHT * lanes + j] = rope[1]
+    row[at.ROPE_DRAG * lanes + j] = rope[2]
+    row[at.LOSS_TIME * lanes + j] = rope[3]
+    row[at.END_SHARE * lanes + j] = 0.5 if elements > 1 else 1.0 / 3.0
+    row[at.LOAD_INERTIA * lanes + j] = inertia[0]
+    row[(at.LOAD_INERTIA + 1) * lanes + j] = inertia[1]
+    row[at.LOAD_WEIGHT * lanes + j] = weight
+    row[at.LOAD_DRAG * lanes + j] = drag[0]
+    row[(at.LOAD_DRAG + 1) * lanes + j] = drag[1]
+
+
+def hang_rope(row: Any, lanes: int, j: int, comoving: bool) -> None:
+    """Hang the nodes of lane j's rope where they are at rest; they move with the pulley if ``comoving``."""
+    elements, axial = int(row[at.ELEMENTS * lanes + j]), row[at.AXIAL_STIFFNESS * lanes + j]
+    drum_part, rope_weight = row[at.DRUM_PART * lanes + j], row[at.ROPE_WEIGHT * lanes + j]
+    if elements == 0:
+        return
+    element = (row[at.FREE_LENGTH * lanes + j] - drum_part) / elements
+    place = 0.0
+    for i in range(elements - 1, 0, -1):
+        force = row[at.LOAD_WEIGHT * lanes + j] + (i + 0.5) * rope_weight * element
+        length = element
+        if i == elements - 1:
+            length += drum_part
+            place -= row[at.DRUM_TO_PULLEY * lanes + j] * (1.0 - 0.5 * rope_weight * element / axial)
+        place += length * (1.0 + force / axial)
+        row[(at.LIFT + i) * lanes + j] = place
+        if comoving:
+            row[(at.LIFT + at.ELEMENTS_MOST + i) * lanes + j] = -row[(at.PULLEY + 5) * lanes + j]
 
 
 def hang_load(row: Any, lanes: int, j: int, comoving: bool) -> None:

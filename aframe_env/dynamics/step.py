@@ -13,9 +13,17 @@ from numba import prange
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.blocks import put_three, three
 from aframe_env.dynamics.compiling import fma, kernel, larger, parallel_kernel, scalar, select
+from aframe_env.dynamics.heavy_rope import COST, PEAK, SLACKEST, elements_of, lift_step, put_end, stage
 from aframe_env.dynamics.layout import LANES, Span
 from aframe_env.dynamics.load import Load, RopeEnd, load_acceleration, load_constants, rk4_step
-from aframe_env.dynamics.motion import advance_motion, deck_coordinate, end_motion, pulley_on_path, start_motion
+from aframe_env.dynamics.motion import (
+    advance_motion,
+    deck_coordinate,
+    end_motion,
+    pulley_acceleration_on_path,
+    pulley_on_path,
+    start_motion,
+)
 from aframe_env.dynamics.winch import drum_state, next_error, plan
 
 Array = npt.NDArray[np.float64]
@@ -78,51 +86,62 @@ def begin_load(row: Array, span: Span) -> None:
 
 
 @scalar
+def rope_ends(row: Array, index: int, active: bool, lanes: int, j: int) -> tuple[RopeEnd, RopeEnd, RopeEnd]:
+    """Turn lane j's drum over inner step ``index``: the rope's upper end at its start, middle and end."""
+    full = row[at.INNER_STEP * lanes + j]
+    # A lane whose segment is over finds drum and pulley where they are.
+    place = select(active, index, row[at.SUBSTEPS * lanes + j] - 1.0)
+    middle, end = (place + 0.5) * full, place * full + full
+    error0 = row[(at.WINCH + 4) * lanes + j]
+    first, decay = row[(at.WINCH + 3) * lanes + j], row[at.HALF_STEP_DECAY * lanes + j]
+    error1 = next_error(error0, 2.0 * index + 1.0, first, decay)
+    error2 = select(active, next_error(error1, 2.0 * index + 2.0, first, decay), error0)
+    radius, free_length = row[at.DRUM_RADIUS * lanes + j], row[at.FREE_LENGTH * lanes + j]
+    length0 = fma(radius, row[at.DRUM_ANGLE * lanes + j], free_length)
+    rate0 = radius * row[at.DRUM_SPEED * lanes + j]
+    angle1, speed1 = drum_at(row, lanes, j, middle, error1)
+    angle2, speed2 = drum_at(row, lanes, j, end, error2)
+    row[(at.WINCH + 4) * lanes + j] = error2
+    row[at.DRUM_ANGLE * lanes + j] = angle2
+    row[at.DRUM_SPEED * lanes + j] = speed2
+    length1, length2 = fma(radius, angle1, free_length), fma(radius, angle2, free_length)
+    # One division for both; the stiffness at the start is the end's of the inner step before.
+    share = row[at.AXIAL_STIFFNESS * lanes + j] / (length1 * length2)
+    stiffness0, stiffness1, stiffness2 = row[at.STIFFNESS * lanes + j], share * length2, share * length1
+    row[at.STIFFNESS * lanes + j] = stiffness2
+    intact = 1.0 - row[at.PARTED * lanes + j]
+    since_node = row[at.ELAPSED * lanes + j]
+    pulley1, pulley_rate1 = pulley_on_path(row, since_node + middle, lanes, j)
+    pulley2, pulley_rate2 = pulley_on_path(row, since_node + end, lanes, j)
+    pulley0, pulley_rate0 = three(row, at.PULLEY, lanes, j), three(row, at.PULLEY + 3, lanes, j)
+    put_three(row, at.PULLEY, lanes, j, pulley2)
+    put_three(row, at.PULLEY + 3, lanes, j, pulley_rate2)
+    return (
+        RopeEnd(pulley0, pulley_rate0, length0, rate0, intact * stiffness0),
+        RopeEnd(pulley1, pulley_rate1, length1, radius * speed1, intact * stiffness1),
+        RopeEnd(pulley2, pulley_rate2, length2, radius * speed2, intact * stiffness2),
+    )
+
+
+@scalar
 def inner_step(row: Array, index: int, span: Span) -> None:
     """Make inner step ``index`` of the segment in every lane that has so many (the others stand still)."""
     lanes = span.stride
     for j in range(span.begin, span.end):
         active = index < row[at.SUBSTEPS * lanes + j]
-        full = row[at.INNER_STEP * lanes + j]
-        # A lane whose segment is over finds drum and pulley where they are.
-        place = select(active, index, row[at.SUBSTEPS * lanes + j] - 1.0)
-        middle, end = (place + 0.5) * full, place * full + full
-        error0 = row[(at.WINCH + 4) * lanes + j]
-        first, decay = row[(at.WINCH + 3) * lanes + j], row[at.HALF_STEP_DECAY * lanes + j]
-        error1 = next_error(error0, 2.0 * index + 1.0, first, decay)
-        error2 = select(active, next_error(error1, 2.0 * index + 2.0, first, decay), error0)
-        radius, free_length = row[at.DRUM_RADIUS * lanes + j], row[at.FREE_LENGTH * lanes + j]
-        length0 = fma(radius, row[at.DRUM_ANGLE * lanes + j], free_length)
-        rate0 = radius * row[at.DRUM_SPEED * lanes + j]
-        angle1, speed1 = drum_at(row, lanes, j, middle, error1)
-        angle2, speed2 = drum_at(row, lanes, j, end, error2)
-        row[(at.WINCH + 4) * lanes + j] = error2
-        row[at.DRUM_ANGLE * lanes + j] = angle2
-        row[at.DRUM_SPEED * lanes + j] = speed2
-        length1, length2 = fma(radius, angle1, free_length), fma(radius, angle2, free_length)
-        # One division for both; the stiffness at the start is the end's of the inner step before.
-        share = row[at.AXIAL_STIFFNESS * lanes + j] / (length1 * length2)
-        stiffness0, stiffness1, stiffness2 = row[at.STIFFNESS * lanes + j], share * length2, share * length1
-        row[at.STIFFNESS * lanes + j] = stiffness2
-        parted, target = row[at.PARTED * lanes + j], row[at.TARGET * lanes + j]
-        intact = 1.0 - parted
-        since_node = row[at.ELAPSED * lanes + j]
-        pulley1, pulley_rate1 = pulley_on_path(row, since_node + middle, lanes, j)
-        pulley2, pulley_rate2 = pulley_on_path(row, since_node + end, lanes, j)
-        pulley0, pulley_rate0 = three(row, at.PULLEY, lanes, j), three(row, at.PULLEY + 3, lanes, j)
+        start, middle, end = rope_ends(row, index, active, lanes, j)
+        target, intact = row[at.TARGET * lanes + j], 1.0 - row[at.PARTED * lanes + j]
         load, cost, peak = rk4_step(
             Load(three(row, at.LOAD_POSITION, lanes, j), three(row, at.LOAD_VELOCITY, lanes, j)),
-            RopeEnd(pulley0, pulley_rate0, length0, rate0, intact * stiffness0),
-            RopeEnd(pulley1, pulley_rate1, length1, radius * speed1, intact * stiffness1),
-            RopeEnd(pulley2, pulley_rate2, length2, radius * speed2, intact * stiffness2),
-            select(active, full, 0.0),
+            start,
+            middle,
+            end,
+            select(active, row[at.INNER_STEP * lanes + j], 0.0),
             target,
             load_constants(row, intact, lanes, j),
         )
         put_three(row, at.LOAD_POSITION, lanes, j, load.position)
         put_three(row, at.LOAD_VELOCITY, lanes, j, load.velocity)
-        put_three(row, at.PULLEY, lanes, j, pulley2)
-        put_three(row, at.PULLEY + 3, lanes, j, pulley_rate2)
         row[at.STEP_COST * lanes + j] += cost
         # What is never negative is taken by its magnitude, PARTED through its complement: these are the same numbers,
         # but the compiler would see that a store changes nothing and leave it out in some lanes, as in ``select``.
@@ -136,8 +155,55 @@ def inner_step(row: Array, index: int, span: Span) -> None:
 
 
 @scalar
-def measure_tension(row: Array, span: Span) -> None:
-    """Measure the rope tension at the row's present state, and whether the rope is slack."""
+def heavy_inner_step(row: Array, index: int, most: int, span: Span) -> None:
+    """Make inner step ``index`` in lanes whose ropes have mass or whose loads are in water, as ``inner_step`` does."""
+    lanes = span.stride
+    for j in range(span.begin, span.end):
+        active = index < row[at.SUBSTEPS * lanes + j]
+        full, since_node = row[at.INNER_STEP * lanes + j], row[at.ELAPSED * lanes + j]
+        place = since_node + full * select(active, index, row[at.SUBSTEPS * lanes + j] - 1.0)
+        start, middle, end = rope_ends(row, index, active, lanes, j)
+        put_end(row, at.ENDS, lanes, j, start, pulley_acceleration_on_path(row, place, lanes, j))
+        half = pulley_acceleration_on_path(row, place + 0.5 * full, lanes, j)
+        put_end(row, at.ENDS + at.END_SIZE, lanes, j, middle, half)
+        put_end(row, at.ENDS + 2 * at.END_SIZE, lanes, j, end, pulley_acceleration_on_path(row, place + full, lanes, j))
+        row[at.STEP_LENGTH * lanes + j] = select(active, full, 0.0)
+    lift_step(row, most, span)
+    for j in range(span.begin, span.end):
+        # Each as in ``inner_step``.
+        active = row[at.STEP_LENGTH * lanes + j] > 0.0
+        row[at.STEP_COST * lanes + j] += row[at.STEP_LENGTH * lanes + j] * (1.0 / 6.0) * row[(at.STAGE + COST) * lanes + j]
+        error = row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j]
+        row[at.OMEGA2 * lanes + j] = larger(abs(error), abs(row[at.OMEGA2 * lanes + j]))
+        slack = active & (row[(at.STAGE + SLACKEST) * lanes + j] <= 0.0)
+        row[at.SLACK * lanes + j] = larger(select(slack, 1.0, 0.0), abs(row[at.SLACK * lanes + j]))
+        peak = select(active, row[(at.STAGE + PEAK) * lanes + j], 0.0)
+        row[at.PEAK_TENSION * lanes + j] = larger(peak, abs(row[at.PEAK_TENSION * lanes + j]))
+        intact = 1.0 - row[at.PARTED * lanes + j]
+        row[at.PARTED * lanes + j] = 1.0 - select(peak > row[at.BREAKING_LOAD * lanes + j], 0.0, intact)
+
+
+@scalar
+def measure_heavy(row: Array, most: int, span: Span) -> None:
+    """Measure tensions and slackness of lanes whose ropes have mass at their present state."""
+    lanes = span.stride
+    for j in range(span.begin, span.end):
+        radius = row[at.DRUM_RADIUS * lanes + j]
+        length = fma(radius, row[at.DRUM_ANGLE * lanes + j], row[at.FREE_LENGTH * lanes + j])
+        position, velocity = three(row, at.PULLEY, lanes, j), three(row, at.PULLEY + 3, lanes, j)
+        end = RopeEnd(position, velocity, length, radius * row[at.DRUM_SPEED * lanes + j], 0.0)
+        put_end(row, at.ENDS, lanes, j, end, three(row, at.PULLEY + 6, lanes, j))
+        row[at.STEP_LENGTH * lanes + j] = 0.0
+        row[(at.STAGE + SLACKEST) * lanes + j] = 1.0
+    stage(row, at.LIFT, at.LIFT_A, at.ENDS, 0.5, 1.0, most, span)
+    for j in range(span.begin, span.end):
+        slack = row[(at.STAGE + SLACKEST) * lanes + j] <= 0.0
+        row[at.SLACK * lanes + j] = 1.0 if slack else row[at.SLACK * lanes + j]
+
+
+@scalar
+def measure_light(row: Array, span: Span) -> None:
+    """Measure tension and slackness of lanes with the paper's rope at their present state."""
     lanes = span.stride
     for j in range(span.begin, span.end):
         radius = row[at.DRUM_RADIUS * lanes + j]
@@ -159,6 +225,48 @@ def measure_tension(row: Array, span: Span) -> None:
 
 
 @scalar
+def measure_tension(row: Array, span: Span) -> None:
+    """Measure the rope tension at the row's present state, and whether the rope is slack."""
+    fewest, most = elements_of(row, span)
+    if most == 0:
+        measure_light(row, span)
+    elif fewest > 0:
+        measure_heavy(row, most, span)
+    else:
+        for j in range(span.begin, span.end):
+            own = Span(span.stride, j, j + 1)
+            elements = int(row[at.ELEMENTS * span.stride + j])
+            if elements == 0:
+                measure_light(row, own)
+            else:
+                measure_heavy(row, elements, own)
+
+
+@scalar
+def inner_steps(row: Array, count: int, span: Span) -> None:
+    """Make the inner steps of a segment, ``count`` at most.
+
+    A block in which some ropes have mass goes lane by lane: what the others do takes another loop.
+    """
+    fewest, most = elements_of(row, span)
+    if most == 0:
+        for index in range(count):
+            inner_step(row, index, span)
+    elif fewest > 0:
+        for index in range(count):
+            heavy_inner_step(row, index, most, span)
+    else:
+        for j in range(span.begin, span.end):
+            own = Span(span.stride, j, j + 1)
+            elements = int(row[at.ELEMENTS * span.stride + j])
+            for index in range(int(row[at.SUBSTEPS * span.stride + j])):
+                if elements == 0:
+                    inner_step(row, index, own)
+                else:
+                    heavy_inner_step(row, index, elements, own)
+
+
+@scalar
 def control_step(row: Array, components: int, segments: int, records: Array, span: Span) -> None:
     """Advance a block by one control step of ``segments`` motion segments, the command held."""
     lanes = span.stride
@@ -172,8 +280,7 @@ def control_step(row: Array, components: int, segments: int, records: Array, spa
         advance_motion(row, components, records, span)
         plan_winch(row, span)
         begin_load(row, span)
-        for index in range(int(most)):
-            inner_step(row, index, span)
+        inner_steps(row, int(most), span)
         end_motion(row, span)
     measure_tension(row, span)
     for j in range(span.begin, span.end):
