@@ -55,7 +55,7 @@ def timing(scenario: Scenario, control_period: float, max_inner_step: float | No
     segments = math.ceil(control_period / MAX_SEGMENT - 1e-9)
     segment = control_period / segments
     longest = max_inner_step or longest_inner_step(scenario.rope_frequency, scenario.rope_damping_rate)
-    if scenario.elements > 1:
+    if scenario.springs > 1:
         longest = min(longest, _chain_step(scenario))
     return Timing(segments, segment, inner_steps(segment, longest))
 
@@ -63,9 +63,13 @@ def timing(scenario: Scenario, control_period: float, max_inner_step: float | No
 def _chain_step(scenario: Scenario) -> float:
     """Longest stable step for the elements of a scenario's rope, s, with a tenth of its length wound up."""
     rope = scenario.crane.rope
-    loss_time = scenario.total_rope_damping / scenario.rope_stiffness
-    element = 0.9 * scenario.lengths[0] / scenario.elements
-    return longest_chain_step(element, math.sqrt(rope.axial_stiffness / rope.mass_per_length), loss_time)
+    return longest_chain_step(
+        0.9 * scenario.lengths[0] / (scenario.springs - 1),
+        rope.mass_per_length,
+        rope.axial_stiffness,
+        scenario.load_mass + scenario.load.added_mass_vertical,
+        scenario.total_rope_damping / scenario.rope_stiffness,
+    )
 
 
 class RecordTable:
@@ -331,7 +335,7 @@ def _fill_parameters(row: FloatArray, scenario: Scenario, times: Timing) -> None
         row,
         1,
         0,
-        scenario.elements,
+        scenario.springs,
         scenario.lengths[1],
         (
             rope.mass_per_length,

@@ -12,8 +12,8 @@ from typing import Final, NamedTuple
 
 LANES: Final = 64
 """Rows in a block."""
-ELEMENTS_MOST: Final = 9
-"""Most elements of a rope with mass."""
+SPRINGS_MOST: Final = 10
+"""Most springs of a rope with mass: one more than it has lumps."""
 
 
 class Span(NamedTuple):
@@ -39,9 +39,9 @@ def _take(size: int) -> int:
 STEP: Final = _take(1)
 """Motion segments since the start."""
 TIME: Final = _take(1)
-LIFT: Final = _take(2 * ELEMENTS_MOST)
-"""Nodes of a rope with mass, the load's first: how far they are below the pulley, m, and how fast they go down, m/s,
-both along the line from pulley to load. The load's place and velocity follow."""
+LIFT: Final = _take(2 * SPRINGS_MOST)
+"""Load and lumps of a rope with mass, from below: how far they are below the pulley, m, and how fast they go down, m/s,
+both along the line from pulley to load. The load's position and velocity follow."""
 LOAD_POSITION: Final = _take(3)
 LOAD_VELOCITY: Final = _take(3)
 DRUM_ANGLE: Final = _take(1)
@@ -108,8 +108,8 @@ RECORD: Final = _take(1)
 RECORD_LENGTH: Final = _take(1)
 YAW_START: Final = _take(1)
 """Yaw that the ramp builds up the yaw about: a record's first, which may be a compass heading; else 0."""
-ELEMENTS: Final = _take(1)
-"""Elements of the rope; 0 for the paper's, which has no mass, in air."""
+SPRINGS: Final = _take(1)
+"""Springs of the rope, one more than it has lumps; 0 for the paper's rope, which has no mass, in air."""
 ROPE_MASS: Final = _take(1)
 """kg/m."""
 ROPE_WEIGHT: Final = _take(1)
@@ -120,12 +120,12 @@ LOSS_TIME: Final = _take(1)
 """Time constant of the rope's material damping, s."""
 DRUM_PART: Final = _take(1)
 """Unstretched length of the rope between drum and pulley, m."""
-END_SHARE: Final = _take(1)
-"""Share of its element's mass that the load carries."""
+HALF_WEIGHT: Final = _take(1)
+"""Half the weight of a rope without lumps, which adds to the tension at the pulley, N; else 0."""
 LOAD_INERTIA: Final = _take(2)
-"""Mass and added mass of the load, horizontally and vertically, kg."""
+"""Mass and added mass of the load, horizontally and vertically, and a third of a rope without lumps, kg."""
 LOAD_WEIGHT: Final = _take(1)
-"""Weight of the load less buoyancy, N."""
+"""Weight of the load less buoyancy, and half of a rope without lumps, N."""
 LOAD_DRAG: Final = _take(2)
 """Drag of the load at 1 m/s, horizontally and vertically, N s²/m²."""
 
@@ -141,7 +141,7 @@ STIFFNESS: Final = _take(1)
 """c_R of the rope at the start of the inner step."""
 STEP_LENGTH: Final = _take(1)
 """Length of the inner step; 0 where the row stands still."""
-LIFT_SIZE: Final = 2 * ELEMENTS_MOST + 6
+LIFT_SIZE: Final = 2 * SPRINGS_MOST + 6
 """Slots from LIFT to the load's velocity."""
 LIFT_A: Final = _take(LIFT_SIZE)
 """Nodes and load as in LIFT at a stage of the Runge-Kutta scheme."""

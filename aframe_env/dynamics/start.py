@@ -48,29 +48,30 @@ def heavy_lengths(
     return below, drum_to_pulley / (1.0 + (weight + rope_weight * below) * softness)
 
 
-def elements_of_rope(below: float, mass_per_length: float, load_mass: float) -> int:
-    """Elements of a rope with ``below`` m under the pulley.
+def springs_of_rope(below: float, mass_per_length: float, load_mass: float) -> int:
+    """Springs of a rope with ``below`` m under the pulley, one more than its lumps.
 
-    They give its first two frequencies within 1 %, with loads of 20 t and more; no more of them where the inner step
-    would have to be shorter for them. One, with a third of the rope's mass at the load, where the rope is short or
-    light beside its load.
+    The lumps give its first two frequencies within 1 %, with loads of 20 t and more; no more of them where the inner
+    step would have to be shorter for them. None, with a third of the rope's mass at the load, where the rope is short
+    or light beside its load.
     """
     if below < SHORT_ROPE or mass_per_length * below < LIGHT_ROPE * load_mass:
         return 1
     if below < 190.0:
-        return 4 if below < 130.0 else 5
-    if below < 500.0:
-        return 6 if below < 350.0 else 7
-    return at.ELEMENTS_MOST
+        return 7
+    return 8 if below < 500.0 else at.SPRINGS_MOST
 
 
-def longest_chain_step(element: float, wave_speed: float, loss_time: float) -> float:
-    """Longest inner step [s] with which RK4 is stable for elements of ``element`` m.
+def longest_chain_step(
+    element: float, mass_per_length: float, axial_stiffness: float, load_mass: float, loss_time: float
+) -> float:
+    """Longest inner step [s] with which RK4 is stable for a rope of elements of ``element`` m.
 
-    ``wave_speed`` of the rope, √(E F/μ), in m/s; ``loss_time`` of its material in s. The chain's fastest mode has
-    2 c / l_e rad/s; damped beyond the critical it decays faster than it would swing.
+    ``load_mass`` with added mass, kg; ``loss_time`` of the rope's material, s. The chain's fastest mode is a little
+    faster than 2 c / l_e, more so above a light load; damped beyond the critical it decays faster than it would swing.
     """
-    fastest = 2.0 * wave_speed / element
+    mass = mass_per_length * element
+    fastest = math.sqrt(axial_stiffness / element * (4.4 / mass + 2.0 / (load_mass + mass / 6.0)))
     over = 0.5 * loss_time * fastest
     rate = fastest * (over + math.sqrt(over * over - 1.0)) if over > 1.0 else fastest
     return CHAIN_PHASE / rate
@@ -129,7 +130,7 @@ def write_heavy(
     row: Any,
     lanes: int,
     j: int,
-    elements: int,
+    springs: int,
     drum_part: float,
     rope: tuple[float, float, float, float],
     inertia: tuple[float, float],
@@ -138,41 +139,41 @@ def write_heavy(
 ) -> None:
     """Write what a rope with mass and a load in water need beside ``write_lift`` into lane j.
 
-    ``elements`` of the rope; ``drum_part`` unstretched from drum to pulley, m; ``rope``: mass kg/m, weight N/m, drag
+    ``springs`` of the rope; ``drum_part`` unstretched from drum to pulley, m; ``rope``: mass kg/m, weight N/m, drag
     N s²/m³, loss time s; the load's ``inertia`` [kg] and ``drag`` [N s²/m²], horizontal and vertical; its ``weight``, N.
     """
-    row[at.ELEMENTS * lanes + j] = elements
+    below = row[at.FREE_LENGTH * lanes + j] - drum_part
+    half_weight = 0.5 * rope[1] * below if springs == 1 else 0.0
+    third = rope[0] * below / 3.0 if springs == 1 else 0.0
+    row[at.SPRINGS * lanes + j] = springs
     row[at.DRUM_PART * lanes + j] = drum_part
     row[at.ROPE_MASS * lanes + j] = rope[0]
     row[at.ROPE_WEIGHT * lanes + j] = rope[1]
     row[at.ROPE_DRAG * lanes + j] = rope[2]
     row[at.LOSS_TIME * lanes + j] = rope[3]
-    row[at.END_SHARE * lanes + j] = 0.5 if elements > 1 else 1.0 / 3.0
-    row[at.LOAD_INERTIA * lanes + j] = inertia[0]
-    row[(at.LOAD_INERTIA + 1) * lanes + j] = inertia[1]
-    row[at.LOAD_WEIGHT * lanes + j] = weight
+    row[at.HALF_WEIGHT * lanes + j] = half_weight
+    row[at.LOAD_INERTIA * lanes + j] = inertia[0] + third
+    row[(at.LOAD_INERTIA + 1) * lanes + j] = inertia[1] + third
+    row[at.LOAD_WEIGHT * lanes + j] = weight + half_weight
     row[at.LOAD_DRAG * lanes + j] = drag[0]
     row[(at.LOAD_DRAG + 1) * lanes + j] = drag[1]
 
 
 def hang_rope(row: Any, lanes: int, j: int, comoving: bool) -> None:
-    """Hang the nodes of lane j's rope where they are at rest; they move with the pulley if ``comoving``."""
-    elements, axial = int(row[at.ELEMENTS * lanes + j]), row[at.AXIAL_STIFFNESS * lanes + j]
-    drum_part, rope_weight = row[at.DRUM_PART * lanes + j], row[at.ROPE_WEIGHT * lanes + j]
-    if elements == 0:
+    """Hang the lumps of lane j's rope where they are at rest; they move with the pulley if ``comoving``."""
+    lumps = int(row[at.SPRINGS * lanes + j]) - 1
+    if lumps < 1:
         return
-    element = (row[at.FREE_LENGTH * lanes + j] - drum_part) / elements
-    place = 0.0
-    for i in range(elements - 1, 0, -1):
-        force = row[at.LOAD_WEIGHT * lanes + j] + (i + 0.5) * rope_weight * element
+    drum_part, softness = row[at.DRUM_PART * lanes + j], 1.0 / row[at.AXIAL_STIFFNESS * lanes + j]
+    element = (row[at.FREE_LENGTH * lanes + j] - drum_part) / lumps
+    place, length = -row[at.DRUM_TO_PULLEY * lanes + j], drum_part + 0.5 * element
+    for i in range(lumps, 0, -1):
+        force = row[at.LOAD_WEIGHT * lanes + j] + i * row[at.ROPE_WEIGHT * lanes + j] * element
+        place += length * (1.0 + force * softness)
         length = element
-        if i == elements - 1:
-            length += drum_part
-            place -= row[at.DRUM_TO_PULLEY * lanes + j] * (1.0 - 0.5 * rope_weight * element / axial)
-        place += length * (1.0 + force / axial)
         row[(at.LIFT + i) * lanes + j] = place
         if comoving:
-            row[(at.LIFT + at.ELEMENTS_MOST + i) * lanes + j] = -row[(at.PULLEY + 5) * lanes + j]
+            row[(at.LIFT + at.SPRINGS_MOST + i) * lanes + j] = -row[(at.PULLEY + 5) * lanes + j]
 
 
 def hang_load(row: Any, lanes: int, j: int, comoving: bool) -> None:

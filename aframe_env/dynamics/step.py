@@ -13,7 +13,7 @@ from numba import prange
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.blocks import put_three, three
 from aframe_env.dynamics.compiling import fma, kernel, larger, parallel_kernel, scalar, select
-from aframe_env.dynamics.heavy_rope import COST, PEAK, SLACKEST, elements_of, lift_step, put_end, stage
+from aframe_env.dynamics.heavy_rope import COST, PEAK, SLACKEST, springs_of, lift_step, put_end, stage
 from aframe_env.dynamics.layout import LANES, Span
 from aframe_env.dynamics.load import Load, RopeEnd, load_acceleration, load_constants, rk4_step
 from aframe_env.dynamics.motion import (
@@ -227,7 +227,7 @@ def measure_light(row: Array, span: Span) -> None:
 @scalar
 def measure_tension(row: Array, span: Span) -> None:
     """Measure the rope tension at the row's present state, and whether the rope is slack."""
-    fewest, most = elements_of(row, span)
+    fewest, most = springs_of(row, span)
     if most == 0:
         measure_light(row, span)
     elif fewest > 0:
@@ -235,11 +235,11 @@ def measure_tension(row: Array, span: Span) -> None:
     else:
         for j in range(span.begin, span.end):
             own = Span(span.stride, j, j + 1)
-            elements = int(row[at.ELEMENTS * span.stride + j])
-            if elements == 0:
+            springs = int(row[at.SPRINGS * span.stride + j])
+            if springs == 0:
                 measure_light(row, own)
             else:
-                measure_heavy(row, elements, own)
+                measure_heavy(row, springs, own)
 
 
 @scalar
@@ -248,7 +248,7 @@ def inner_steps(row: Array, count: int, span: Span) -> None:
 
     A block in which some ropes have mass goes lane by lane: what the others do takes another loop.
     """
-    fewest, most = elements_of(row, span)
+    fewest, most = springs_of(row, span)
     if most == 0:
         for index in range(count):
             inner_step(row, index, span)
@@ -258,12 +258,12 @@ def inner_steps(row: Array, count: int, span: Span) -> None:
     else:
         for j in range(span.begin, span.end):
             own = Span(span.stride, j, j + 1)
-            elements = int(row[at.ELEMENTS * span.stride + j])
+            springs = int(row[at.SPRINGS * span.stride + j])
             for index in range(int(row[at.SUBSTEPS * span.stride + j])):
-                if elements == 0:
+                if springs == 0:
                     inner_step(row, index, own)
                 else:
-                    heavy_inner_step(row, index, elements, own)
+                    heavy_inner_step(row, index, springs, own)
 
 
 @scalar

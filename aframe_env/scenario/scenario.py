@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Final, Literal
 
-from aframe_env.dynamics.start import elements_of_rope, heavy_lengths
+from aframe_env.dynamics.start import heavy_lengths, springs_of_rope
 from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.scenario.motion import HarmonicMotion, ShipMotion, has_components, is_tabled
 from aframe_env.scenario.water import LoadShape, Water
@@ -158,16 +158,17 @@ class Scenario:
         return heavy_lengths(self.rope_length, self.crane.drum_to_pulley, self.weight, axial, self.rope_weight)
 
     @cached_property
-    def elements(self) -> int:
-        """Elements that the rope is divided into; 0 for the paper's rope."""
-        return 0 if self.is_light else elements_of_rope(self.lengths[0], self.crane.rope.mass_per_length, self.load_mass)
+    def springs(self) -> int:
+        """Springs that the rope is divided into, one more than it has lumps of mass; 0 for the paper's rope."""
+        rope = self.crane.rope
+        return 0 if self.is_light else springs_of_rope(self.lengths[0], rope.mass_per_length, self.load_mass)
 
     @cached_property
     def free_length(self) -> float:
         """l_0, m: unstretched length between drum and load that holds the load at its target, ship at rest."""
-        if self.is_light:
-            return self.crane.free_length(self.rope_length, self.weight)
-        return sum(self.lengths)
+        if self.springs > 1:
+            return sum(self.lengths)
+        return self.crane.free_length(self.rope_length, self.weight + 0.5 * self.rope_weight * self.lengths[0])
 
     @property
     def rope_stiffness(self) -> float:
