@@ -15,7 +15,6 @@ A single spring without lumps, and with the rope's mass at nought, is the simpli
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -170,78 +169,74 @@ def advance_slot(
         row[(target + slot) * lanes + j] = fma(fraction * h, rate, state)
 
 
-def _spring(i: int) -> Callable[[Array, int, int, float, float, Span], None]:
-    """Spring i of the rope, from its load's end, and the lump at its lower end (for spring 0, the load: not here)."""
+@scalar
+def spring(
+    row: Array, i: int, source: int, target: int, fraction: float, weight: float, span: Span
+) -> None:
+    """Pull with spring i of the rope, from its load's end, and move the lump at its lower end (not the load)."""
+    lanes = span.stride
     half = 0.5 if i == 0 else 1.0
     # Strain and speed change within a spring; at a lump each of its two springs counts by the other's length.
-    upper_share, top_share = (1.0 / 3.0, 0.5) if i == 1 else (0.5, 2.0 / 3.0)
-
-    @scalar
-    def pull(row: Array, source: int, target: int, fraction: float, weight: float, span: Span) -> None:
-        lanes = span.stride
-        for j in range(span.begin, span.end):
-            springs = row[at.SPRINGS * lanes + j]
-            inside, top = springs > i, springs == i + 1
-            place, speed = row[(source + i) * lanes + j], row[(source + SPEED + i) * lanes + j]
-            pulley_speed = row[(at.STAGE + PULLEY_SPEED) * lanes + j]
-            paid_out = row[(at.STAGE + PAID_OUT) * lanes + j]
-            upper = select(top, -row[at.DRUM_TO_PULLEY * lanes + j], row[(source + i + 1) * lanes + j])
-            upper_speed = select(top, pulley_speed + paid_out, row[(source + SPEED + i + 1) * lanes + j])
-            element = row[(at.STAGE + ELEMENT) * lanes + j]
-            stiffness = select(
-                top, row[(at.STAGE + TOP_STIFFNESS) * lanes + j], row[(at.STAGE + STIFFNESS) * lanes + j] / half
+    upper_share = 1.0 / 3.0 if i == 1 else 0.5
+    top_share = 0.5 if i == 1 else 2.0 / 3.0
+    for j in range(span.begin, span.end):
+        springs = row[at.SPRINGS * lanes + j]
+        inside, top = springs > i, springs == i + 1
+        place, speed = row[(source + i) * lanes + j], row[(source + SPEED + i) * lanes + j]
+        pulley_speed = row[(at.STAGE + PULLEY_SPEED) * lanes + j]
+        paid_out = row[(at.STAGE + PAID_OUT) * lanes + j]
+        upper = select(top, -row[at.DRUM_TO_PULLEY * lanes + j], row[(source + i + 1) * lanes + j])
+        upper_speed = select(top, pulley_speed + paid_out, row[(source + SPEED + i + 1) * lanes + j])
+        element = row[(at.STAGE + ELEMENT) * lanes + j]
+        stiffness = select(
+            top, row[(at.STAGE + TOP_STIFFNESS) * lanes + j], row[(at.STAGE + STIFFNESS) * lanes + j] / half
+        )
+        elongation = place - upper - select(top, row[(at.STAGE + TOP_LENGTH) * lanes + j], half * element)
+        tension = larger(
+            stiffness * fma(row[at.LOSS_TIME * lanes + j], speed - upper_speed, elongation), 0.0
+        )
+        below = row[(at.STAGE + BELOW) * lanes + j]
+        row[(at.STAGE + BELOW) * lanes + j] = select(inside, tension, below)
+        least = row[(at.STAGE + LEAST) * lanes + j]
+        row[(at.STAGE + LEAST) * lanes + j] = smaller(least, select(inside, tension, least))
+        if i == 0:
+            row[(at.STAGE + BOTTOM) * lanes + j] = tension
+        else:
+            softness = row[(at.STAGE + SOFTNESS) * lanes + j]
+            inverse = row[(at.STAGE + INVERSE_ELEMENT) * lanes + j]
+            # Where the pulley is, the rope goes down with it and with what is paid out.
+            upper_speed = fma(select(top, softness * tension, 0.0), paid_out, upper_speed)
+            share = select(top, top_share, upper_share)
+            strain = softness * fma(share, tension - below, below)
+            lower_slope = (speed - row[(source + SPEED + i - 1) * lanes + j]) * inverse * (2.0 if i == 1 else 1.0)
+            upper_slope = (upper_speed - speed) * inverse * select(top, 2.0, 1.0)
+            slope = fma(share, upper_slope - lower_slope, lower_slope)
+            passing = (i - 0.5) * row[(at.STAGE + PASSING) * lanes + j]
+            lumps = springs - 1.0
+            # What the load carries for the lowest lump; so the sum of mass times place stays as it is.
+            mass = fma(-2.0 * LOAD_SHARE, lumps / fma(2.0, lumps, -1.0), 1.0) if i == 1 else 1.0
+            own = fma(
+                row[at.ROPE_WEIGHT * lanes + j],
+                row[(at.STAGE + SINKING) * lanes + j],
+                -row[at.ROPE_DRAG * lanes + j] * abs(speed) * speed,
             )
-            elongation = place - upper - select(top, row[(at.STAGE + TOP_LENGTH) * lanes + j], half * element)
-            tension = larger(
-                stiffness * fma(row[at.LOSS_TIME * lanes + j], speed - upper_speed, elongation), 0.0
+            acceleration = row[(at.STAGE + INVERSE_MASS) * lanes + j] * fma(element, own, below - tension)
+            if i == 1:
+                acceleration /= mass
+            turning = fma(
+                place, row[(at.STAGE + TURN_SQUARED) * lanes + j], row[(at.STAGE + CARRIED) * lanes + j]
             )
-            below = row[(at.STAGE + BELOW) * lanes + j]
-            row[(at.STAGE + BELOW) * lanes + j] = select(inside, tension, below)
-            least = row[(at.STAGE + LEAST) * lanes + j]
-            row[(at.STAGE + LEAST) * lanes + j] = smaller(least, select(inside, tension, least))
-            if i == 0:
-                row[(at.STAGE + BOTTOM) * lanes + j] = tension
-            else:
-                softness = row[(at.STAGE + SOFTNESS) * lanes + j]
-                inverse = row[(at.STAGE + INVERSE_ELEMENT) * lanes + j]
-                # Where the pulley is, the rope goes down with it and with what is paid out.
-                upper_speed = fma(select(top, softness * tension, 0.0), paid_out, upper_speed)
-                share = select(top, select(i == 1 and springs == 2.0, 0.5, top_share), upper_share)
-                strain = softness * fma(share, tension - below, below)
-                lower_slope = (speed - row[(source + SPEED + i - 1) * lanes + j]) * inverse * (2.0 if i == 1 else 1.0)
-                upper_slope = (upper_speed - speed) * inverse * select(top, 2.0, 1.0)
-                slope = fma(share, upper_slope - lower_slope, lower_slope)
-                passing = (i - 0.5) * row[(at.STAGE + PASSING) * lanes + j]
-                lumps = springs - 1.0
-                # What the load carries for the lowest lump; so the sum of mass times place stays as it is.
-                mass = fma(-2.0 * LOAD_SHARE, lumps / fma(2.0, lumps, -1.0), 1.0) if i == 1 else 1.0
-                own = fma(
-                    row[at.ROPE_WEIGHT * lanes + j],
-                    row[(at.STAGE + SINKING) * lanes + j],
-                    -row[at.ROPE_DRAG * lanes + j] * abs(speed) * speed,
-                )
-                acceleration = row[(at.STAGE + INVERSE_MASS) * lanes + j] * fma(element, own, below - tension)
-                if i == 1:
-                    acceleration /= mass
-                turning = fma(
-                    place, row[(at.STAGE + TURN_SQUARED) * lanes + j], row[(at.STAGE + CARRIED) * lanes + j]
-                )
-                own_rate = speed - pulley_speed
-                lever = select(inside, place * row[(at.STAGE + NEARNESS) * lanes + j], 0.0)
-                lever_rate = fma(-lever, row[(at.STAGE + AWAY_RATE) * lanes + j], own_rate)
-                row[(at.STAGE + LEVER) * lanes + j] += lever
-                row[(at.STAGE + MASS_LEVER) * lanes + j] += mass * lever
-                row[(at.STAGE + MASS_LEVER_SQUARED) * lanes + j] += mass * lever * lever
-                row[(at.STAGE + MASS_LEVER_RATE) * lanes + j] += mass * lever * lever_rate
-                place_rate = select(inside, fma(-passing, 1.0 + strain, own_rate), 0.0)
-                speed_rate = select(inside, fma(slope, passing, acceleration + turning), 0.0)
-                advance_slot(row, i, place_rate, source, target, fraction, weight, lanes, j)
-                advance_slot(row, SPEED + i, speed_rate, source, target, fraction, weight, lanes, j)
-
-    return pull
-
-
-_s0, _s1, _s2, _s3, _s4, _s5, _s6, _s7, _s8, _s9 = (_spring(i) for i in range(SPRINGS_MOST))
+            own_rate = speed - pulley_speed
+            lever = select(inside, place * row[(at.STAGE + NEARNESS) * lanes + j], 0.0)
+            lever_rate = fma(-lever, row[(at.STAGE + AWAY_RATE) * lanes + j], own_rate)
+            row[(at.STAGE + LEVER) * lanes + j] += lever
+            row[(at.STAGE + MASS_LEVER) * lanes + j] += mass * lever
+            row[(at.STAGE + MASS_LEVER_SQUARED) * lanes + j] += mass * lever * lever
+            row[(at.STAGE + MASS_LEVER_RATE) * lanes + j] += mass * lever * lever_rate
+            place_rate = select(inside, fma(-passing, 1.0 + strain, own_rate), 0.0)
+            speed_rate = select(inside, fma(slope, passing, acceleration + turning), 0.0)
+            advance_slot(row, i, place_rate, source, target, fraction, weight, lanes, j)
+            advance_slot(row, SPEED + i, speed_rate, source, target, fraction, weight, lanes, j)
 
 
 @scalar
@@ -306,27 +301,35 @@ def pull_load(row: Array, source: int, target: int, end: int, fraction: float, w
 
 @scalar
 def stage(
-    row: Array, source: int, target: int, end: int, fraction: float, weight: float, most: int, span: Span
+    row: Array, source: int, target: int, end: int, fraction: float, weight: float, most: int, unrolled: bool, span: Span
 ) -> None:
-    """Make one stage of the Runge-Kutta scheme: from the rates at ``source`` to the state at ``target``."""
+    """Make one stage of the Runge-Kutta scheme: from the rates at ``source`` to the state at ``target``.
+
+    ``unrolled``: springs by constant numbers, which the compiler vectorises over the lanes but takes long to compile.
+    """
     aim(row, source, end, span)
-    _s0(row, source, target, fraction, weight, span)
-    if most > 1:
-        _s1(row, source, target, fraction, weight, span)
-        _s2(row, source, target, fraction, weight, span)
-        _s3(row, source, target, fraction, weight, span)
-        _s4(row, source, target, fraction, weight, span)
-        _s5(row, source, target, fraction, weight, span)
-        _s6(row, source, target, fraction, weight, span)
-    if most > 7:
-        _s7(row, source, target, fraction, weight, span)
-        _s8(row, source, target, fraction, weight, span)
-        _s9(row, source, target, fraction, weight, span)
+    if unrolled:
+        spring(row, 0, source, target, fraction, weight, span)
+        if most > 1:
+            spring(row, 1, source, target, fraction, weight, span)
+            spring(row, 2, source, target, fraction, weight, span)
+            spring(row, 3, source, target, fraction, weight, span)
+            spring(row, 4, source, target, fraction, weight, span)
+            spring(row, 5, source, target, fraction, weight, span)
+            spring(row, 6, source, target, fraction, weight, span)
+        if most > 7:
+            spring(row, 7, source, target, fraction, weight, span)
+        if most > 8:
+            spring(row, 8, source, target, fraction, weight, span)
+            spring(row, 9, source, target, fraction, weight, span)
+    else:
+        for i in range(most):
+            spring(row, i, source, target, fraction, weight, span)
     pull_load(row, source, target, end, fraction, weight, span)
 
 
 @scalar
-def lift_step(row: Array, most: int, span: Span) -> None:
+def lift_step(row: Array, most: int, unrolled: bool, span: Span) -> None:
     """Make one Runge-Kutta step of STEP_LENGTH with ropes of up to ``most`` springs, whose ends are in ENDS."""
     lanes = span.stride
     for j in range(span.begin, span.end):
@@ -334,10 +337,18 @@ def lift_step(row: Array, most: int, span: Span) -> None:
         row[(at.STAGE + SLACKEST) * lanes + j] = math.inf
         row[(at.STAGE + COST) * lanes + j] = 0.0
     start, middle, end = at.ENDS, at.ENDS + at.END_SIZE, at.ENDS + 2 * at.END_SIZE
-    stage(row, at.LIFT, at.LIFT_A, start, 0.5, 1.0, most, span)
-    stage(row, at.LIFT_A, at.LIFT_B, middle, 0.5, 2.0, most, span)
-    stage(row, at.LIFT_B, at.LIFT_A, middle, 1.0, 2.0, most, span)
-    stage(row, at.LIFT_A, at.LIFT, end, 1.0, 1.0, most, span)
+    if unrolled:
+        stage(row, at.LIFT, at.LIFT_A, start, 0.5, 1.0, most, unrolled, span)
+        stage(row, at.LIFT_A, at.LIFT_B, middle, 0.5, 2.0, most, unrolled, span)
+        stage(row, at.LIFT_B, at.LIFT_A, middle, 1.0, 2.0, most, unrolled, span)
+        stage(row, at.LIFT_A, at.LIFT, end, 1.0, 1.0, most, unrolled, span)
+    else:
+        for k in range(4):
+            source = at.LIFT if k == 0 else (at.LIFT_B if k == 2 else at.LIFT_A)
+            target = at.LIFT if k == 3 else (at.LIFT_B if k == 1 else at.LIFT_A)
+            upper = start if k == 0 else (end if k == 3 else middle)
+            fraction = 0.5 if k < 2 else 1.0
+            stage(row, source, target, upper, fraction, 2.0 if k == 1 or k == 2 else 1.0, most, unrolled, span)
 
 
 @scalar

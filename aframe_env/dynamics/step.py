@@ -155,7 +155,7 @@ def inner_step(row: Array, index: int, span: Span) -> None:
 
 
 @scalar
-def heavy_inner_step(row: Array, index: int, most: int, span: Span) -> None:
+def heavy_inner_step(row: Array, index: int, most: int, unrolled: bool, span: Span) -> None:
     """Make inner step ``index`` in lanes whose ropes have mass or whose loads are in water, as ``inner_step`` does."""
     lanes = span.stride
     for j in range(span.begin, span.end):
@@ -168,7 +168,7 @@ def heavy_inner_step(row: Array, index: int, most: int, span: Span) -> None:
         put_end(row, at.ENDS + at.END_SIZE, lanes, j, middle, half)
         put_end(row, at.ENDS + 2 * at.END_SIZE, lanes, j, end, pulley_acceleration_on_path(row, place + full, lanes, j))
         row[at.STEP_LENGTH * lanes + j] = select(active, full, 0.0)
-    lift_step(row, most, span)
+    lift_step(row, most, unrolled, span)
     for j in range(span.begin, span.end):
         # Each as in ``inner_step``.
         active = row[at.STEP_LENGTH * lanes + j] > 0.0
@@ -184,7 +184,7 @@ def heavy_inner_step(row: Array, index: int, most: int, span: Span) -> None:
 
 
 @scalar
-def measure_heavy(row: Array, most: int, span: Span) -> None:
+def measure_heavy(row: Array, most: int, unrolled: bool, span: Span) -> None:
     """Measure tensions and slackness of lanes whose ropes have mass at their present state."""
     lanes = span.stride
     for j in range(span.begin, span.end):
@@ -195,15 +195,15 @@ def measure_heavy(row: Array, most: int, span: Span) -> None:
         put_end(row, at.ENDS, lanes, j, end, three(row, at.PULLEY + 6, lanes, j))
         row[at.STEP_LENGTH * lanes + j] = 0.0
         row[(at.STAGE + SLACKEST) * lanes + j] = 1.0
-    stage(row, at.LIFT, at.LIFT_A, at.ENDS, 0.5, 1.0, most, span)
+    stage(row, at.LIFT, at.LIFT_A, at.ENDS, 0.5, 1.0, most, unrolled, span)
     for j in range(span.begin, span.end):
         slack = row[(at.STAGE + SLACKEST) * lanes + j] <= 0.0
         row[at.SLACK * lanes + j] = 1.0 if slack else row[at.SLACK * lanes + j]
 
 
 @scalar
-def measure_light(row: Array, span: Span) -> None:
-    """Measure tension and slackness of lanes with the paper's rope at their present state."""
+def measure_tension(row: Array, span: Span) -> None:
+    """Measure the rope tension at the row's present state, and whether the rope is slack."""
     lanes = span.stride
     for j in range(span.begin, span.end):
         radius = row[at.DRUM_RADIUS * lanes + j]
@@ -225,78 +225,93 @@ def measure_light(row: Array, span: Span) -> None:
 
 
 @scalar
-def measure_tension(row: Array, span: Span) -> None:
-    """Measure the rope tension at the row's present state, and whether the rope is slack."""
-    fewest, most = springs_of(row, span)
-    if most == 0:
-        measure_light(row, span)
-    elif fewest > 0:
-        measure_heavy(row, most, span)
-    else:
-        for j in range(span.begin, span.end):
-            own = Span(span.stride, j, j + 1)
-            springs = int(row[at.SPRINGS * span.stride + j])
+def measure_any(row: Array, span: Span) -> None:
+    """Measure tension and slackness of lanes with ropes of either kind."""
+    for j in range(span.begin, span.end):
+        own = Span(span.stride, j, j + 1)
+        springs = int(row[at.SPRINGS * span.stride + j])
+        if springs == 0:
+            measure_tension(row, own)
+        else:
+            measure_heavy(row, springs, False, own)
+
+
+@scalar
+def light_steps(row: Array, count: int, span: Span) -> None:
+    """Make the inner steps of a segment, ``count`` at most, with the paper's rope."""
+    for index in range(count):
+        inner_step(row, index, span)
+
+
+@scalar
+def lane_steps(row: Array, count: int, span: Span) -> None:
+    """Make the inner steps of a segment, ``count`` at most, with ropes of either kind, lane by lane."""
+    for j in range(span.begin, span.end):
+        own = Span(span.stride, j, j + 1)
+        springs = int(row[at.SPRINGS * span.stride + j])
+        for index in range(int(row[at.SUBSTEPS * span.stride + j])):
             if springs == 0:
-                measure_light(row, own)
+                inner_step(row, index, own)
             else:
-                measure_heavy(row, springs, own)
+                heavy_inner_step(row, index, springs, False, own)
 
 
 @scalar
-def inner_steps(row: Array, count: int, span: Span) -> None:
-    """Make the inner steps of a segment, ``count`` at most.
-
-    A block in which some ropes have mass goes lane by lane: what the others do takes another loop.
-    """
+def block_steps(row: Array, count: int, span: Span) -> None:
+    """Make the inner steps of a segment, ``count`` at most, with ropes of either kind: in a mixed block lane by lane."""
     fewest, most = springs_of(row, span)
     if most == 0:
-        for index in range(count):
-            inner_step(row, index, span)
+        light_steps(row, count, span)
     elif fewest > 0:
         for index in range(count):
-            heavy_inner_step(row, index, most, span)
+            heavy_inner_step(row, index, most, True, span)
     else:
+        lane_steps(row, count, span)
+
+
+def _step_of(
+    inner_steps: Callable[[Array, int, Span], None], measure: Callable[[Array, Span], None]
+) -> tuple[Callable[..., None], Callable[..., None]]:
+    """Control step and start of a block, by how the inner steps are made and the tension is measured."""
+
+    @scalar
+    def control_step(row: Array, components: int, segments: int, records: Array, span: Span) -> None:
+        lanes = span.stride
+        most = 0.0
         for j in range(span.begin, span.end):
-            own = Span(span.stride, j, j + 1)
-            springs = int(row[at.SPRINGS * span.stride + j])
-            for index in range(int(row[at.SUBSTEPS * span.stride + j])):
-                if springs == 0:
-                    inner_step(row, index, own)
-                else:
-                    heavy_inner_step(row, index, springs, own)
+            row[at.STEP_COST * lanes + j] = 0.0
+            row[at.PEAK_TENSION * lanes + j] = 0.0
+            row[at.SLACK * lanes + j] = 0.0
+            most = row[at.SUBSTEPS * lanes + j] if row[at.SUBSTEPS * lanes + j] > most else most
+        for _ in range(segments):
+            advance_motion(row, components, records, span)
+            plan_winch(row, span)
+            begin_load(row, span)
+            inner_steps(row, int(most), span)
+            end_motion(row, span)
+        measure(row, span)
+        for j in range(span.begin, span.end):
+            row[at.OMEGA1 * lanes + j] += row[at.STEP_COST * lanes + j]
+
+    @scalar
+    def start_rows(row: Array, components: int, records: Array, span: Span) -> None:
+        lanes = span.stride
+        for j in range(span.begin, span.end):
+            row[at.SLACK * lanes + j] = 0.0
+        start_motion(row, components, records, span)
+        measure(row, span)
+        for j in range(span.begin, span.end):
+            row[at.PEAK_TENSION * lanes + j] = row[at.TENSION * lanes + j]
+
+    return control_step, start_rows
 
 
-@scalar
-def control_step(row: Array, components: int, segments: int, records: Array, span: Span) -> None:
-    """Advance a block by one control step of ``segments`` motion segments, the command held."""
-    lanes = span.stride
-    most = 0.0
-    for j in range(span.begin, span.end):
-        row[at.STEP_COST * lanes + j] = 0.0
-        row[at.PEAK_TENSION * lanes + j] = 0.0
-        row[at.SLACK * lanes + j] = 0.0
-        most = row[at.SUBSTEPS * lanes + j] if row[at.SUBSTEPS * lanes + j] > most else most
-    for _ in range(segments):
-        advance_motion(row, components, records, span)
-        plan_winch(row, span)
-        begin_load(row, span)
-        inner_steps(row, int(most), span)
-        end_motion(row, span)
-    measure_tension(row, span)
-    for j in range(span.begin, span.end):
-        row[at.OMEGA1 * lanes + j] += row[at.STEP_COST * lanes + j]
-
-
-@scalar
-def start_rows(row: Array, components: int, records: Array, span: Span) -> None:
-    """Pose deck and pulley and measure the rope tension at the rows' time, before the first step."""
-    lanes = span.stride
-    for j in range(span.begin, span.end):
-        row[at.SLACK * lanes + j] = 0.0
-    start_motion(row, components, records, span)
-    measure_tension(row, span)
-    for j in range(span.begin, span.end):
-        row[at.PEAK_TENSION * lanes + j] = row[at.TENSION * lanes + j]
+# Control step of a block by ``segments`` motion segments, the command held; and pose of deck and pulley with the rope's
+# tension at the rows' time, before the first step. With the paper's rope alone; and with ropes of either kind, which
+# takes long to compile and gives the paper's rope the same bits: lane by lane, and in whole blocks.
+control_step, start_rows = _step_of(light_steps, measure_tension)
+lane_control_step, any_start_rows = _step_of(lane_steps, measure_any)
+block_control_step, _ = _step_of(block_steps, measure_any)
 
 
 class StepKernels(NamedTuple):
@@ -313,19 +328,25 @@ class StepKernels(NamedTuple):
 
 
 @cache
-def step_kernels(lanes: int = LANES) -> StepKernels:
-    """Kernels for blocks of ``lanes`` rows (LANES for a batch, 1 for a single row)."""
+def step_kernels(lanes: int = LANES, heavy: bool = False) -> StepKernels:
+    """Kernels for blocks of ``lanes`` rows (LANES for a batch, 1 for a single row).
+
+    ``heavy``: for ropes with mass and loads in water too.
+    """
     span = Span(lanes, 0, lanes)
+    advance, begin = control_step, start_rows
+    if heavy:
+        advance, begin = (block_control_step if lanes > 1 else lane_control_step), any_start_rows
 
     @parallel_kernel
     def step(blocks: Array, components: int, segments: int, records: Array) -> None:
         for block in prange(blocks.shape[0]):
-            control_step(blocks[block], components, segments, records, span)
+            advance(blocks[block], components, segments, records, span)
 
     @kernel
     def start(blocks: Array, components: int, records: Array) -> None:
         for block in range(blocks.shape[0]):
-            start_rows(blocks[block], components, records, span)
+            begin(blocks[block], components, records, span)
 
     @kernel
     def deck(blocks: Array, coordinates: Array) -> None:
