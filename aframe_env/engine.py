@@ -15,7 +15,6 @@ from aframe_env.dynamics.start import (
     hang_load,
     hang_rope,
     inner_steps,
-    longest_chain_step,
     longest_inner_step,
     write_heavy,
     write_lift,
@@ -56,20 +55,8 @@ def timing(scenario: Scenario, control_period: float, max_inner_step: float | No
     segment = control_period / segments
     longest = max_inner_step or longest_inner_step(scenario.rope_frequency, scenario.rope_damping_rate)
     if scenario.springs > 1:
-        longest = min(longest, _chain_step(scenario))
+        longest = min(longest, scenario.chain_step)
     return Timing(segments, segment, inner_steps(segment, longest))
-
-
-def _chain_step(scenario: Scenario) -> float:
-    """Longest stable step for the elements of a scenario's rope, s, with a tenth of its length wound up."""
-    rope = scenario.crane.rope
-    return longest_chain_step(
-        0.9 * scenario.lengths[0] / (scenario.springs - 1),
-        rope.mass_per_length,
-        rope.axial_stiffness,
-        scenario.load_mass + scenario.load.added_mass_vertical,
-        scenario.total_rope_damping / scenario.rope_stiffness,
-    )
 
 
 class RecordTable:
@@ -343,7 +330,7 @@ def _fill_parameters(row: FloatArray, scenario: Scenario, times: Timing) -> None
             rope.mass_per_length,
             scenario.rope_weight,
             half_density * rope.tangential_drag * math.pi * rope.solid_diameter,
-            scenario.total_rope_damping / scenario.rope_stiffness,
+            scenario.loss_time,
         ),
         (scenario.load_mass + load.added_mass_horizontal, scenario.load_mass + load.added_mass_vertical),
         scenario.weight,

@@ -59,6 +59,7 @@ PAY_OUT: Final = 10
     STIFFNESS,
     TOP_LENGTH,
     TOP_STIFFNESS,
+    TOP_LOSS,
     PAID_OUT,
     PASSING,
     INVERSE_MASS,
@@ -73,7 +74,7 @@ PAY_OUT: Final = 10
     PEAK,
     SLACKEST,
     COST,
-) = range(31)
+) = range(32)
 
 LOAD_SHARE: Final = 1.0 / 6.0
 """Share of an element's mass that the load carries for the lowest lump."""
@@ -135,6 +136,9 @@ def aim(row: Array, source: int, end: int, span: Span) -> None:
         row[(at.STAGE + STIFFNESS) * lanes + j] = axial * inverse
         row[(at.STAGE + TOP_LENGTH) * lanes + j] = top_length
         row[(at.STAGE + TOP_STIFFNESS) * lanes + j] = intact * axial / top_length
+        # A single spring has the constant damping of eq. (26), the elements of a chain their material's.
+        constant = row[at.ROPE_DAMPING * lanes + j] * top_length / axial
+        row[(at.STAGE + TOP_LOSS) * lanes + j] = select(bare, constant, row[at.LOSS_TIME * lanes + j])
         row[(at.STAGE + PAID_OUT) * lanes + j] = pay_out
         row[(at.STAGE + PASSING) * lanes + j] = pay_out * share
         row[(at.STAGE + INVERSE_MASS) * lanes + j] = 1.0 / mass
@@ -170,9 +174,7 @@ def advance_slot(
 
 
 @scalar
-def spring(
-    row: Array, i: int, source: int, target: int, fraction: float, weight: float, span: Span
-) -> None:
+def spring(row: Array, i: int, source: int, target: int, fraction: float, weight: float, span: Span) -> None:
     """Pull with spring i of the rope, from its load's end, and move the lump at its lower end (not the load)."""
     lanes = span.stride
     half = 0.5 if i == 0 else 1.0
@@ -192,9 +194,8 @@ def spring(
             top, row[(at.STAGE + TOP_STIFFNESS) * lanes + j], row[(at.STAGE + STIFFNESS) * lanes + j] / half
         )
         elongation = place - upper - select(top, row[(at.STAGE + TOP_LENGTH) * lanes + j], half * element)
-        tension = larger(
-            stiffness * fma(row[at.LOSS_TIME * lanes + j], speed - upper_speed, elongation), 0.0
-        )
+        loss_time = select(top, row[(at.STAGE + TOP_LOSS) * lanes + j], row[at.LOSS_TIME * lanes + j])
+        tension = larger(stiffness * fma(loss_time, speed - upper_speed, elongation), 0.0)
         below = row[(at.STAGE + BELOW) * lanes + j]
         row[(at.STAGE + BELOW) * lanes + j] = select(inside, tension, below)
         least = row[(at.STAGE + LEAST) * lanes + j]
@@ -223,9 +224,7 @@ def spring(
             acceleration = row[(at.STAGE + INVERSE_MASS) * lanes + j] * fma(element, own, below - tension)
             if i == 1:
                 acceleration /= mass
-            turning = fma(
-                place, row[(at.STAGE + TURN_SQUARED) * lanes + j], row[(at.STAGE + CARRIED) * lanes + j]
-            )
+            turning = fma(place, row[(at.STAGE + TURN_SQUARED) * lanes + j], row[(at.STAGE + CARRIED) * lanes + j])
             own_rate = speed - pulley_speed
             lever = select(inside, place * row[(at.STAGE + NEARNESS) * lanes + j], 0.0)
             lever_rate = fma(-lever, row[(at.STAGE + AWAY_RATE) * lanes + j], own_rate)
@@ -301,7 +300,15 @@ def pull_load(row: Array, source: int, target: int, end: int, fraction: float, w
 
 @scalar
 def stage(
-    row: Array, source: int, target: int, end: int, fraction: float, weight: float, most: int, unrolled: bool, span: Span
+    row: Array,
+    source: int,
+    target: int,
+    end: int,
+    fraction: float,
+    weight: float,
+    most: int,
+    unrolled: bool,
+    span: Span,
 ) -> None:
     """Make one stage of the Runge-Kutta scheme: from the rates at ``source`` to the state at ``target``.
 

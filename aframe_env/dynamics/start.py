@@ -140,7 +140,7 @@ def write_heavy(
     """Write what a rope with mass and a load in water need beside ``write_lift`` into lane j.
 
     ``springs`` of the rope; ``drum_part`` unstretched from drum to pulley, m; ``rope``: mass kg/m, weight N/m, drag
-    N s²/m³, loss time s; the load's ``inertia`` [kg] and ``drag`` [N s²/m²], horizontal and vertical; its ``weight``, N.
+    N s²/m³, loss time s; the load's ``inertia`` [kg], ``weight`` [N] and ``drag`` [N s²/m²], horizontal and vertical.
     """
     below = row[at.FREE_LENGTH * lanes + j] - drum_part
     half_weight = 0.5 * rope[1] * below if springs == 1 else 0.0

@@ -13,7 +13,7 @@ from numba import prange
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.blocks import put_three, three
 from aframe_env.dynamics.compiling import fma, kernel, larger, parallel_kernel, scalar, select
-from aframe_env.dynamics.heavy_rope import COST, PEAK, SLACKEST, springs_of, lift_step, put_end, stage
+from aframe_env.dynamics.heavy_rope import COST, PEAK, SLACKEST, lift_step, put_end, springs_of, stage
 from aframe_env.dynamics.layout import LANES, Span
 from aframe_env.dynamics.load import Load, RopeEnd, load_acceleration, load_constants, rk4_step
 from aframe_env.dynamics.motion import (
@@ -172,7 +172,9 @@ def heavy_inner_step(row: Array, index: int, most: int, unrolled: bool, span: Sp
     for j in range(span.begin, span.end):
         # Each as in ``inner_step``.
         active = row[at.STEP_LENGTH * lanes + j] > 0.0
-        row[at.STEP_COST * lanes + j] += row[at.STEP_LENGTH * lanes + j] * (1.0 / 6.0) * row[(at.STAGE + COST) * lanes + j]
+        row[at.STEP_COST * lanes + j] += (
+            row[at.STEP_LENGTH * lanes + j] * (1.0 / 6.0) * row[(at.STAGE + COST) * lanes + j]
+        )
         error = row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j]
         row[at.OMEGA2 * lanes + j] = larger(abs(error), abs(row[at.OMEGA2 * lanes + j]))
         slack = active & (row[(at.STAGE + SLACKEST) * lanes + j] <= 0.0)
@@ -258,7 +260,7 @@ def lane_steps(row: Array, count: int, span: Span) -> None:
 
 @scalar
 def block_steps(row: Array, count: int, span: Span) -> None:
-    """Make the inner steps of a segment, ``count`` at most, with ropes of either kind: in a mixed block lane by lane."""
+    """Make the inner steps of a segment with ropes of either kind; in a mixed block lane by lane."""
     fewest, most = springs_of(row, span)
     if most == 0:
         light_steps(row, count, span)

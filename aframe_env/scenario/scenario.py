@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Final, Literal
 
-from aframe_env.dynamics.start import heavy_lengths, springs_of_rope
+from aframe_env.dynamics.start import heavy_lengths, longest_chain_step, springs_of_rope
 from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.scenario.motion import HarmonicMotion, ShipMotion, has_components, is_tabled
 from aframe_env.scenario.water import LoadShape, Water
@@ -21,6 +21,8 @@ LEAST_RAMP: Final = 1e-3
 """Shortest build-up that is one, s."""
 FASTEST_BOBBING: Final = 1e4
 """Greatest angular frequency of a load bobbing on its rope, rad/s: the inner step follows it."""
+SHORTEST_CHAIN_STEP: Final = 2.4e-4
+"""Shortest inner step that a rope with mass may ask for, s."""
 FASTEST_DECAY: Final = 1e6
 """Greatest damping of a rope for each kilogram of load, 1/s: the inner step follows it."""
 
@@ -93,6 +95,7 @@ class Scenario:
                 f"rope_damping = {self.rope_damping!r} N s/m: must be in [0, {FASTEST_DECAY * self.load_mass:g}] N s/m "
                 f"with a load of {self.load_mass:g} kg"
             )
+        self._require_chain()
 
     def _require_wet(self) -> None:
         """Raise where water, rope and load do not go together."""
@@ -111,6 +114,15 @@ class Scenario:
             raise InvalidValue(
                 f"volume = {self.load.volume!r} m³: a load of {self.load_mass:g} kg floats: must be below "
                 f"{self.load_mass / self.water.density:g} m³"
+            )
+
+    def _require_chain(self) -> None:
+        """Raise where the waves in the rope are too fast for the inner step."""
+        if self.springs > 1 and self.chain_step < SHORTEST_CHAIN_STEP:
+            raise InvalidValue(
+                f"mass_per_length = {self.crane.rope.mass_per_length!r} kg/m: the waves in the rope need steps of "
+                f"{self.chain_step:.2g} s, must be at least {SHORTEST_CHAIN_STEP:g} s: make it 0 kg/m, or the rope "
+                "heavier, softer or less damped"
             )
 
     @classmethod
@@ -151,6 +163,14 @@ class Scenario:
         """Whether the rope has no mass and hangs in air, as the paper's."""
         return self.water is None and not self.crane.rope.mass_per_length
 
+    def require_light(self, what: str) -> None:
+        """Raise where the rope has mass or hangs in water: ``what`` takes the paper's rope alone."""
+        if not self.is_light:
+            raise InvalidValue(
+                f"mass_per_length = {self.crane.rope.mass_per_length!r} kg/m, water = {shown(self.water)}: {what} take "
+                "a rope without mass in air: must be 0 kg/m, and None"
+            )
+
     @cached_property
     def lengths(self) -> tuple[float, float]:
         """Unstretched rope below the pulley and from there to the drum, m, that hold the load at its target at rest."""
@@ -169,6 +189,20 @@ class Scenario:
         if self.springs > 1:
             return sum(self.lengths)
         return self.crane.free_length(self.rope_length, self.weight + 0.5 * self.rope_weight * self.lengths[0])
+
+    @property
+    def chain_step(self) -> float:
+        """Longest stable inner step for the rope's elements, s, with a tenth of its length wound up."""
+        rope, lumps = self.crane.rope, self.springs - 1
+        mass = self.load_mass + self.load.added_mass_vertical
+        return longest_chain_step(
+            0.9 * self.lengths[0] / lumps, rope.mass_per_length, rope.axial_stiffness, mass, self.loss_time
+        )
+
+    @property
+    def loss_time(self) -> float:
+        """β of the rope's damping, the material's and ``rope_damping``, s."""
+        return self.total_rope_damping / self.rope_stiffness
 
     @property
     def rope_stiffness(self) -> float:
