@@ -16,11 +16,22 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from aframe_env import Crane, Harmonic, HarmonicMotion, InvalidValue, Rope, Scenario, Sea, SeaMotion, Winch
+from aframe_env import (
+    Crane,
+    Harmonic,
+    HarmonicMotion,
+    InvalidValue,
+    LoadShape,
+    Rope,
+    Scenario,
+    Sea,
+    SeaMotion,
+    Water,
+    Winch,
+)
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.step import step_kernels
 from aframe_env.engine import Engine
-from aframe_env.scenario.water import LoadShape, Water
 
 FloatArray = npt.NDArray[np.float64]
 DATA = Path(__file__).parents[1] / "data" / "water"
