@@ -8,6 +8,7 @@ from .scenario.scenario import Scenario
 from .scenario.sea import Sea, SeaMotion
 from .scenario.sensors import Channel, Sensors
 from .scenario.vessel import Vessel
+from .scenario.water import LoadShape, Water
 from .validation import (
     InvalidValue,
     RecordNoiseWarning,
@@ -27,6 +28,7 @@ __all__ = [
     "Harmonic",
     "HarmonicMotion",
     "InvalidValue",
+    "LoadShape",
     "RecordNoiseWarning",
     "RecordedMotion",
     "RecordedWindow",
@@ -41,6 +43,7 @@ __all__ = [
     "SmallRotationWarning",
     "TaskConfig",
     "Vessel",
+    "Water",
     "Winch",
     "read_scenario",
     "read_scenarios",

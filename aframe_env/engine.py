@@ -11,8 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.start import hang_load, inner_steps, longest_inner_step, write_lift
-from aframe_env.dynamics.step import step_kernels
+from aframe_env.dynamics.start import (
+    hang_load,
+    hang_rope,
+    inner_steps,
+    longest_inner_step,
+    write_heavy,
+    write_lift,
+)
+from aframe_env.dynamics.step import StepKernels, step_kernels
 from aframe_env.dynamics.wave_components import component_kernels
 from aframe_env.memory import require_memory
 from aframe_env.scenario import Scenario
@@ -47,6 +54,8 @@ def timing(scenario: Scenario, control_period: float, max_inner_step: float | No
     segments = math.ceil(control_period / MAX_SEGMENT - 1e-9)
     segment = control_period / segments
     longest = max_inner_step or longest_inner_step(scenario.rope_frequency, scenario.rope_damping_rate)
+    if scenario.springs > 1:
+        longest = min(longest, scenario.chain_step)
     return Timing(segments, segment, inner_steps(segment, longest))
 
 
@@ -119,8 +128,7 @@ class Engine:
         self._max_inner_step = max_inner_step
         self._segments = math.ceil(control_period / MAX_SEGMENT - 1e-9)
         self._lanes = 1 if rows == 1 else at.LANES
-        self._kernels = step_kernels(self._lanes)
-        self._step = self._kernels.step if rows <= at.LANES else self._kernels.step_parallel
+        self._use(step_kernels(self._lanes))
         self._components = at.padded(components)
         blocks = -(-rows // self._lanes)
         require_memory(f"num_envs = {rows}", 8 * blocks * self._lanes * self._slots_of_row(self._components))
@@ -129,6 +137,10 @@ class Engine:
         # Lanes beyond the last row hold the paper's case, so that no lane computes with zeros for parameters.
         idle = self.row_vector(Scenario.paper())
         self._fill(idle)
+
+    def _use(self, kernels: StepKernels) -> None:
+        self._kernels = kernels
+        self._step = kernels.step if self.rows <= at.LANES else kernels.step_parallel
 
     @property
     def _view(self) -> FloatArray:
@@ -186,6 +198,8 @@ class Engine:
         view = self._view
         view[block, : len(vector), lane] = vector
         view[block, len(vector) :, lane] = 0.0
+        if vector[at.SPRINGS] > 0.0:
+            self._use(step_kernels(self._lanes, heavy=True))
 
     def restore_row(self, index: int, vector: FloatArray, scenario: Scenario) -> None:
         """Put back a row of ``scenario`` that ``copy_row`` of this or a like engine gave."""
@@ -215,9 +229,11 @@ class Engine:
         row[at.YAW_START] = self._records.lines[record, Coordinate.YAW] if record_length else 0.0
         row[at.NODE_SEGMENTS] = segments
         component_kernels().write(row, components.frequency, components.response, segments * times.segment)
-        self._kernels_of_one.start(row[None], self._components, self._records.lines)
+        kernels = step_kernels(1, heavy=not scenario.is_light)
+        kernels.start(row[None], self._components, self._records.lines)
         hang_load(row, 1, 0, scenario.initial == "comoving")
-        self._kernels_of_one.start(row[None], self._components, self._records.lines)
+        hang_rope(row, 1, 0, scenario.initial == "comoving")
+        kernels.start(row[None], self._components, self._records.lines)
         return row
 
     def _slots_of_row(self, components: int) -> int:
@@ -258,10 +274,6 @@ class Engine:
             adopted[at.RECORD], adopted[at.RECORD_LENGTH] = self._record(scenario.motion, times.segment)
         return adopted
 
-    @property
-    def _kernels_of_one(self):  # type: ignore[no-untyped-def]
-        return step_kernels(1)
-
     def _record(self, motion: TabledMotion, segment: float) -> tuple[int, int]:
         """First line and length of a recorded motion in the table of records, which it is added to when new."""
         return self._records.place(motion, segment, lambda: set(self._view[:, at.RECORD].ravel().tolist()))
@@ -299,11 +311,30 @@ def _fill_parameters(row: FloatArray, scenario: Scenario, times: Timing) -> None
         0,
         scenario.load_mass,
         scenario.target_level,
-        scenario.rope_damping,
+        scenario.total_rope_damping,
         scenario.free_length,
         winch.min_rope_length,
         winch.max_rope_length,
         times.substeps,
+    )
+    if scenario.is_light:
+        return
+    load, half_density = scenario.load, 0.5 * scenario.density
+    write_heavy(
+        row,
+        1,
+        0,
+        scenario.springs,
+        scenario.lengths[1],
+        (
+            rope.mass_per_length,
+            scenario.rope_weight,
+            half_density * rope.tangential_drag * math.pi * rope.solid_diameter,
+            scenario.loss_time,
+        ),
+        (scenario.load_mass + load.added_mass_horizontal, scenario.load_mass + load.added_mass_vertical),
+        scenario.weight,
+        (half_density * load.drag_area_horizontal, half_density * load.drag_area_vertical),
     )
 
 

@@ -101,6 +101,7 @@ class FlexibleEngine(Engine):
 
     def row_vector(self, scenario: Scenario) -> FloatArray:
         """Slots of a row at the start of a scenario, the frame's first: (frame slots + slots,)."""
+        scenario.require_light('environments with model="rfem"')
         row = super().row_vector(scenario)
         frame = np.zeros(self._slots)
         frame[flex.FRAME] = self._line(scenario)

@@ -32,6 +32,7 @@ class CudaRows:
         self._kernels = kernels()
         self._blocks_of_threads = -(-rows // LANES)
         source = host.source
+        host.config.nominal.require_light("environments on a CUDA device")
         self._components = _count_components(source)
         engine = Engine(1, host.control_period, self._components, host.config.max_inner_step)
         vector = engine.row_vector(host.config.nominal)

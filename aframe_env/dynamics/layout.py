@@ -12,6 +12,8 @@ from typing import Final, NamedTuple
 
 LANES: Final = 64
 """Rows in a block."""
+SPRINGS_MOST: Final = 10
+"""Most springs of a rope with mass: one more than it has lumps."""
 
 
 class Span(NamedTuple):
@@ -37,6 +39,9 @@ def _take(size: int) -> int:
 STEP: Final = _take(1)
 """Motion segments since the start."""
 TIME: Final = _take(1)
+LIFT: Final = _take(2 * SPRINGS_MOST)
+"""Load and lumps of a rope with mass, from below: how far they are below the pulley, m, and how fast they go down, m/s,
+both along the line from pulley to load. The load's position and velocity follow."""
 LOAD_POSITION: Final = _take(3)
 LOAD_VELOCITY: Final = _take(3)
 DRUM_ANGLE: Final = _take(1)
@@ -67,6 +72,8 @@ CHARGED: Final = _take(1)
 """1 once the task has charged a parted row for the rest of its episode."""
 PARTED: Final = _take(1)
 """1 from the moment at which the tension passed the breaking load."""
+LOAD_TENSION: Final = _take(1)
+"""Tension of a rope with mass at the load; TENSION is that at the pulley."""
 
 # Parameters.
 MASS: Final = _take(1)
@@ -101,6 +108,26 @@ RECORD: Final = _take(1)
 RECORD_LENGTH: Final = _take(1)
 YAW_START: Final = _take(1)
 """Yaw that the ramp builds up the yaw about: a record's first, which may be a compass heading; else 0."""
+SPRINGS: Final = _take(1)
+"""Springs of the rope, one more than it has lumps; 0 for the paper's rope, which has no mass, in air."""
+ROPE_MASS: Final = _take(1)
+"""kg/m."""
+ROPE_WEIGHT: Final = _take(1)
+"""N/m, less buoyancy."""
+ROPE_DRAG: Final = _take(1)
+"""Tension that a metre of rope takes up at 1 m/s along itself, N s²/m³."""
+LOSS_TIME: Final = _take(1)
+"""Time constant of the rope's material damping, s."""
+DRUM_PART: Final = _take(1)
+"""Unstretched length of the rope between drum and pulley, m."""
+HALF_WEIGHT: Final = _take(1)
+"""Half the weight of a rope without lumps, which adds to the tension at the pulley, N; else 0."""
+LOAD_INERTIA: Final = _take(2)
+"""Mass and added mass of the load, horizontally and vertically, and a third of a rope without lumps, kg."""
+LOAD_WEIGHT: Final = _take(1)
+"""Weight of the load less buoyancy, and half of a rope without lumps, N."""
+LOAD_DRAG: Final = _take(2)
+"""Drag of the load at 1 m/s, horizontally and vertically, N s²/m²."""
 
 # Scratch of one control step.
 DUE: Final = _take(1)
@@ -112,6 +139,22 @@ WINCH: Final = _take(7)
 INVERSE_MASS: Final = _take(1)
 STIFFNESS: Final = _take(1)
 """c_R of the rope at the start of the inner step."""
+STEP_LENGTH: Final = _take(1)
+"""Length of the inner step; 0 where the row stands still."""
+LIFT_SIZE: Final = 2 * SPRINGS_MOST + 6
+"""Slots from LIFT to the load's velocity."""
+LIFT_A: Final = _take(LIFT_SIZE)
+"""Nodes and load as in LIFT at a stage of the Runge-Kutta scheme."""
+LIFT_B: Final = _take(LIFT_SIZE)
+"""The same at the stage after."""
+LIFT_SUM: Final = _take(LIFT_SIZE)
+"""Weighted sum of the stages' rates."""
+END_SIZE: Final = 11
+ENDS: Final = _take(3 * END_SIZE)
+"""Upper end of the rope at the start, middle and end of the inner step: the pulley's position, velocity and
+acceleration, unstretched length between drum and load, and its rate."""
+STAGE: Final = _take(32)
+"""What the parts of a stage tell each other, see ``heavy_rope``."""
 
 ROW_SLOTS: Final = _next()
 

@@ -243,6 +243,25 @@ def pulley_on_path(row: Block, t: float, lanes: int, j: int) -> tuple[Vector, Ve
 
 
 @scalar
+def acceleration_on_path(row: Block, axis: int, t: float, lanes: int, j: int) -> float:
+    """Acceleration of lane j's pulley along an axis, ``t`` s after the node before."""
+    c = at.PATH + 6 * axis
+    return second_derivative(
+        row[(c + 2) * lanes + j], row[(c + 3) * lanes + j], row[(c + 4) * lanes + j], row[(c + 5) * lanes + j], t
+    )
+
+
+@scalar
+def pulley_acceleration_on_path(row: Block, t: float, lanes: int, j: int) -> Vector:
+    """Acceleration of lane j's pulley, ``t`` s after the node before."""
+    return Vector(
+        acceleration_on_path(row, 0, t, lanes, j),
+        acceleration_on_path(row, 1, t, lanes, j),
+        acceleration_on_path(row, 2, t, lanes, j),
+    )
+
+
+@scalar
 def lay_path(row: Block, span: Span) -> None:
     """Lay the quintics through the pulley's path up to the next node, in the lanes that are due."""
     lanes = span.stride

@@ -13,9 +13,17 @@ from numba import prange
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.blocks import put_three, three
 from aframe_env.dynamics.compiling import fma, kernel, larger, parallel_kernel, scalar, select
+from aframe_env.dynamics.heavy_rope import COST, PEAK, SLACKEST, lift_step, put_end, springs_of, stage
 from aframe_env.dynamics.layout import LANES, Span
 from aframe_env.dynamics.load import Load, RopeEnd, load_acceleration, load_constants, rk4_step
-from aframe_env.dynamics.motion import advance_motion, deck_coordinate, end_motion, pulley_on_path, start_motion
+from aframe_env.dynamics.motion import (
+    advance_motion,
+    deck_coordinate,
+    end_motion,
+    pulley_acceleration_on_path,
+    pulley_on_path,
+    start_motion,
+)
 from aframe_env.dynamics.winch import drum_state, next_error, plan
 
 Array = npt.NDArray[np.float64]
@@ -78,51 +86,62 @@ def begin_load(row: Array, span: Span) -> None:
 
 
 @scalar
+def rope_ends(row: Array, index: int, active: bool, lanes: int, j: int) -> tuple[RopeEnd, RopeEnd, RopeEnd]:
+    """Turn lane j's drum over inner step ``index``: the rope's upper end at its start, middle and end."""
+    full = row[at.INNER_STEP * lanes + j]
+    # A lane whose segment is over finds drum and pulley where they are.
+    place = select(active, index, row[at.SUBSTEPS * lanes + j] - 1.0)
+    middle, end = (place + 0.5) * full, place * full + full
+    error0 = row[(at.WINCH + 4) * lanes + j]
+    first, decay = row[(at.WINCH + 3) * lanes + j], row[at.HALF_STEP_DECAY * lanes + j]
+    error1 = next_error(error0, 2.0 * index + 1.0, first, decay)
+    error2 = select(active, next_error(error1, 2.0 * index + 2.0, first, decay), error0)
+    radius, free_length = row[at.DRUM_RADIUS * lanes + j], row[at.FREE_LENGTH * lanes + j]
+    length0 = fma(radius, row[at.DRUM_ANGLE * lanes + j], free_length)
+    rate0 = radius * row[at.DRUM_SPEED * lanes + j]
+    angle1, speed1 = drum_at(row, lanes, j, middle, error1)
+    angle2, speed2 = drum_at(row, lanes, j, end, error2)
+    row[(at.WINCH + 4) * lanes + j] = error2
+    row[at.DRUM_ANGLE * lanes + j] = angle2
+    row[at.DRUM_SPEED * lanes + j] = speed2
+    length1, length2 = fma(radius, angle1, free_length), fma(radius, angle2, free_length)
+    # One division for both; the stiffness at the start is the end's of the inner step before.
+    share = row[at.AXIAL_STIFFNESS * lanes + j] / (length1 * length2)
+    stiffness0, stiffness1, stiffness2 = row[at.STIFFNESS * lanes + j], share * length2, share * length1
+    row[at.STIFFNESS * lanes + j] = stiffness2
+    intact = 1.0 - row[at.PARTED * lanes + j]
+    since_node = row[at.ELAPSED * lanes + j]
+    pulley1, pulley_rate1 = pulley_on_path(row, since_node + middle, lanes, j)
+    pulley2, pulley_rate2 = pulley_on_path(row, since_node + end, lanes, j)
+    pulley0, pulley_rate0 = three(row, at.PULLEY, lanes, j), three(row, at.PULLEY + 3, lanes, j)
+    put_three(row, at.PULLEY, lanes, j, pulley2)
+    put_three(row, at.PULLEY + 3, lanes, j, pulley_rate2)
+    return (
+        RopeEnd(pulley0, pulley_rate0, length0, rate0, intact * stiffness0),
+        RopeEnd(pulley1, pulley_rate1, length1, radius * speed1, intact * stiffness1),
+        RopeEnd(pulley2, pulley_rate2, length2, radius * speed2, intact * stiffness2),
+    )
+
+
+@scalar
 def inner_step(row: Array, index: int, span: Span) -> None:
     """Make inner step ``index`` of the segment in every lane that has so many (the others stand still)."""
     lanes = span.stride
     for j in range(span.begin, span.end):
         active = index < row[at.SUBSTEPS * lanes + j]
-        full = row[at.INNER_STEP * lanes + j]
-        # A lane whose segment is over finds drum and pulley where they are.
-        place = select(active, index, row[at.SUBSTEPS * lanes + j] - 1.0)
-        middle, end = (place + 0.5) * full, place * full + full
-        error0 = row[(at.WINCH + 4) * lanes + j]
-        first, decay = row[(at.WINCH + 3) * lanes + j], row[at.HALF_STEP_DECAY * lanes + j]
-        error1 = next_error(error0, 2.0 * index + 1.0, first, decay)
-        error2 = select(active, next_error(error1, 2.0 * index + 2.0, first, decay), error0)
-        radius, free_length = row[at.DRUM_RADIUS * lanes + j], row[at.FREE_LENGTH * lanes + j]
-        length0 = fma(radius, row[at.DRUM_ANGLE * lanes + j], free_length)
-        rate0 = radius * row[at.DRUM_SPEED * lanes + j]
-        angle1, speed1 = drum_at(row, lanes, j, middle, error1)
-        angle2, speed2 = drum_at(row, lanes, j, end, error2)
-        row[(at.WINCH + 4) * lanes + j] = error2
-        row[at.DRUM_ANGLE * lanes + j] = angle2
-        row[at.DRUM_SPEED * lanes + j] = speed2
-        length1, length2 = fma(radius, angle1, free_length), fma(radius, angle2, free_length)
-        # One division for both; the stiffness at the start is the end's of the inner step before.
-        share = row[at.AXIAL_STIFFNESS * lanes + j] / (length1 * length2)
-        stiffness0, stiffness1, stiffness2 = row[at.STIFFNESS * lanes + j], share * length2, share * length1
-        row[at.STIFFNESS * lanes + j] = stiffness2
-        parted, target = row[at.PARTED * lanes + j], row[at.TARGET * lanes + j]
-        intact = 1.0 - parted
-        since_node = row[at.ELAPSED * lanes + j]
-        pulley1, pulley_rate1 = pulley_on_path(row, since_node + middle, lanes, j)
-        pulley2, pulley_rate2 = pulley_on_path(row, since_node + end, lanes, j)
-        pulley0, pulley_rate0 = three(row, at.PULLEY, lanes, j), three(row, at.PULLEY + 3, lanes, j)
+        start, middle, end = rope_ends(row, index, active, lanes, j)
+        target, intact = row[at.TARGET * lanes + j], 1.0 - row[at.PARTED * lanes + j]
         load, cost, peak = rk4_step(
             Load(three(row, at.LOAD_POSITION, lanes, j), three(row, at.LOAD_VELOCITY, lanes, j)),
-            RopeEnd(pulley0, pulley_rate0, length0, rate0, intact * stiffness0),
-            RopeEnd(pulley1, pulley_rate1, length1, radius * speed1, intact * stiffness1),
-            RopeEnd(pulley2, pulley_rate2, length2, radius * speed2, intact * stiffness2),
-            select(active, full, 0.0),
+            start,
+            middle,
+            end,
+            select(active, row[at.INNER_STEP * lanes + j], 0.0),
             target,
             load_constants(row, intact, lanes, j),
         )
         put_three(row, at.LOAD_POSITION, lanes, j, load.position)
         put_three(row, at.LOAD_VELOCITY, lanes, j, load.velocity)
-        put_three(row, at.PULLEY, lanes, j, pulley2)
-        put_three(row, at.PULLEY + 3, lanes, j, pulley_rate2)
         row[at.STEP_COST * lanes + j] += cost
         # What is never negative is taken by its magnitude, PARTED through its complement: these are the same numbers,
         # but the compiler would see that a store changes nothing and leave it out in some lanes, as in ``select``.
@@ -133,6 +152,55 @@ def inner_step(row: Array, index: int, span: Span) -> None:
         peak = select(active, peak, 0.0)
         row[at.PEAK_TENSION * lanes + j] = larger(peak, abs(row[at.PEAK_TENSION * lanes + j]))
         row[at.PARTED * lanes + j] = 1.0 - select(peak > row[at.BREAKING_LOAD * lanes + j], 0.0, intact)
+
+
+@scalar
+def heavy_inner_step(row: Array, index: int, most: int, unrolled: bool, span: Span) -> None:
+    """Make inner step ``index`` in lanes whose ropes have mass or whose loads are in water, as ``inner_step`` does."""
+    lanes = span.stride
+    for j in range(span.begin, span.end):
+        active = index < row[at.SUBSTEPS * lanes + j]
+        full, since_node = row[at.INNER_STEP * lanes + j], row[at.ELAPSED * lanes + j]
+        place = since_node + full * select(active, index, row[at.SUBSTEPS * lanes + j] - 1.0)
+        start, middle, end = rope_ends(row, index, active, lanes, j)
+        put_end(row, at.ENDS, lanes, j, start, pulley_acceleration_on_path(row, place, lanes, j))
+        half = pulley_acceleration_on_path(row, place + 0.5 * full, lanes, j)
+        put_end(row, at.ENDS + at.END_SIZE, lanes, j, middle, half)
+        put_end(row, at.ENDS + 2 * at.END_SIZE, lanes, j, end, pulley_acceleration_on_path(row, place + full, lanes, j))
+        row[at.STEP_LENGTH * lanes + j] = select(active, full, 0.0)
+    lift_step(row, most, unrolled, span)
+    for j in range(span.begin, span.end):
+        # Each as in ``inner_step``.
+        active = row[at.STEP_LENGTH * lanes + j] > 0.0
+        row[at.STEP_COST * lanes + j] += (
+            row[at.STEP_LENGTH * lanes + j] * (1.0 / 6.0) * row[(at.STAGE + COST) * lanes + j]
+        )
+        error = row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j]
+        row[at.OMEGA2 * lanes + j] = larger(abs(error), abs(row[at.OMEGA2 * lanes + j]))
+        slack = active & (row[(at.STAGE + SLACKEST) * lanes + j] <= 0.0)
+        row[at.SLACK * lanes + j] = larger(select(slack, 1.0, 0.0), abs(row[at.SLACK * lanes + j]))
+        peak = select(active, row[(at.STAGE + PEAK) * lanes + j], 0.0)
+        row[at.PEAK_TENSION * lanes + j] = larger(peak, abs(row[at.PEAK_TENSION * lanes + j]))
+        intact = 1.0 - row[at.PARTED * lanes + j]
+        row[at.PARTED * lanes + j] = 1.0 - select(peak > row[at.BREAKING_LOAD * lanes + j], 0.0, intact)
+
+
+@scalar
+def measure_heavy(row: Array, most: int, unrolled: bool, span: Span) -> None:
+    """Measure tensions and slackness of lanes whose ropes have mass at their present state."""
+    lanes = span.stride
+    for j in range(span.begin, span.end):
+        radius = row[at.DRUM_RADIUS * lanes + j]
+        length = fma(radius, row[at.DRUM_ANGLE * lanes + j], row[at.FREE_LENGTH * lanes + j])
+        position, velocity = three(row, at.PULLEY, lanes, j), three(row, at.PULLEY + 3, lanes, j)
+        end = RopeEnd(position, velocity, length, radius * row[at.DRUM_SPEED * lanes + j], 0.0)
+        put_end(row, at.ENDS, lanes, j, end, three(row, at.PULLEY + 6, lanes, j))
+        row[at.STEP_LENGTH * lanes + j] = 0.0
+        row[(at.STAGE + SLACKEST) * lanes + j] = 1.0
+    stage(row, at.LIFT, at.LIFT_A, at.ENDS, 0.5, 1.0, most, unrolled, span)
+    for j in range(span.begin, span.end):
+        slack = row[(at.STAGE + SLACKEST) * lanes + j] <= 0.0
+        row[at.SLACK * lanes + j] = 1.0 if slack else row[at.SLACK * lanes + j]
 
 
 @scalar
@@ -159,37 +227,93 @@ def measure_tension(row: Array, span: Span) -> None:
 
 
 @scalar
-def control_step(row: Array, components: int, segments: int, records: Array, span: Span) -> None:
-    """Advance a block by one control step of ``segments`` motion segments, the command held."""
-    lanes = span.stride
-    most = 0.0
+def measure_any(row: Array, span: Span) -> None:
+    """Measure tension and slackness of lanes with ropes of either kind."""
     for j in range(span.begin, span.end):
-        row[at.STEP_COST * lanes + j] = 0.0
-        row[at.PEAK_TENSION * lanes + j] = 0.0
-        row[at.SLACK * lanes + j] = 0.0
-        most = row[at.SUBSTEPS * lanes + j] if row[at.SUBSTEPS * lanes + j] > most else most
-    for _ in range(segments):
-        advance_motion(row, components, records, span)
-        plan_winch(row, span)
-        begin_load(row, span)
-        for index in range(int(most)):
-            inner_step(row, index, span)
-        end_motion(row, span)
-    measure_tension(row, span)
-    for j in range(span.begin, span.end):
-        row[at.OMEGA1 * lanes + j] += row[at.STEP_COST * lanes + j]
+        own = Span(span.stride, j, j + 1)
+        springs = int(row[at.SPRINGS * span.stride + j])
+        if springs == 0:
+            measure_tension(row, own)
+        else:
+            measure_heavy(row, springs, False, own)
 
 
 @scalar
-def start_rows(row: Array, components: int, records: Array, span: Span) -> None:
-    """Pose deck and pulley and measure the rope tension at the rows' time, before the first step."""
-    lanes = span.stride
+def light_steps(row: Array, count: int, span: Span) -> None:
+    """Make the inner steps of a segment, ``count`` at most, with the paper's rope."""
+    for index in range(count):
+        inner_step(row, index, span)
+
+
+@scalar
+def lane_steps(row: Array, count: int, span: Span) -> None:
+    """Make the inner steps of a segment, ``count`` at most, with ropes of either kind, lane by lane."""
     for j in range(span.begin, span.end):
-        row[at.SLACK * lanes + j] = 0.0
-    start_motion(row, components, records, span)
-    measure_tension(row, span)
-    for j in range(span.begin, span.end):
-        row[at.PEAK_TENSION * lanes + j] = row[at.TENSION * lanes + j]
+        own = Span(span.stride, j, j + 1)
+        springs = int(row[at.SPRINGS * span.stride + j])
+        for index in range(int(row[at.SUBSTEPS * span.stride + j])):
+            if springs == 0:
+                inner_step(row, index, own)
+            else:
+                heavy_inner_step(row, index, springs, False, own)
+
+
+@scalar
+def block_steps(row: Array, count: int, span: Span) -> None:
+    """Make the inner steps of a segment with ropes of either kind; in a mixed block lane by lane."""
+    fewest, most = springs_of(row, span)
+    if most == 0:
+        light_steps(row, count, span)
+    elif fewest > 0:
+        for index in range(count):
+            heavy_inner_step(row, index, most, True, span)
+    else:
+        lane_steps(row, count, span)
+
+
+def _step_of(
+    inner_steps: Callable[[Array, int, Span], None], measure: Callable[[Array, Span], None]
+) -> tuple[Callable[..., None], Callable[..., None]]:
+    """Control step and start of a block, by how the inner steps are made and the tension is measured."""
+
+    @scalar
+    def control_step(row: Array, components: int, segments: int, records: Array, span: Span) -> None:
+        lanes = span.stride
+        most = 0.0
+        for j in range(span.begin, span.end):
+            row[at.STEP_COST * lanes + j] = 0.0
+            row[at.PEAK_TENSION * lanes + j] = 0.0
+            row[at.SLACK * lanes + j] = 0.0
+            most = row[at.SUBSTEPS * lanes + j] if row[at.SUBSTEPS * lanes + j] > most else most
+        for _ in range(segments):
+            advance_motion(row, components, records, span)
+            plan_winch(row, span)
+            begin_load(row, span)
+            inner_steps(row, int(most), span)
+            end_motion(row, span)
+        measure(row, span)
+        for j in range(span.begin, span.end):
+            row[at.OMEGA1 * lanes + j] += row[at.STEP_COST * lanes + j]
+
+    @scalar
+    def start_rows(row: Array, components: int, records: Array, span: Span) -> None:
+        lanes = span.stride
+        for j in range(span.begin, span.end):
+            row[at.SLACK * lanes + j] = 0.0
+        start_motion(row, components, records, span)
+        measure(row, span)
+        for j in range(span.begin, span.end):
+            row[at.PEAK_TENSION * lanes + j] = row[at.TENSION * lanes + j]
+
+    return control_step, start_rows
+
+
+# Control step of a block by ``segments`` motion segments, the command held; and pose of deck and pulley with the rope's
+# tension at the rows' time, before the first step. With the paper's rope alone; and with ropes of either kind, which
+# takes long to compile and gives the paper's rope the same bits: lane by lane, and in whole blocks.
+control_step, start_rows = _step_of(light_steps, measure_tension)
+lane_control_step, any_start_rows = _step_of(lane_steps, measure_any)
+block_control_step, _ = _step_of(block_steps, measure_any)
 
 
 class StepKernels(NamedTuple):
@@ -206,19 +330,25 @@ class StepKernels(NamedTuple):
 
 
 @cache
-def step_kernels(lanes: int = LANES) -> StepKernels:
-    """Kernels for blocks of ``lanes`` rows (LANES for a batch, 1 for a single row)."""
+def step_kernels(lanes: int = LANES, heavy: bool = False) -> StepKernels:
+    """Kernels for blocks of ``lanes`` rows (LANES for a batch, 1 for a single row).
+
+    ``heavy``: for ropes with mass and loads in water too.
+    """
     span = Span(lanes, 0, lanes)
+    advance, begin = control_step, start_rows
+    if heavy:
+        advance, begin = (block_control_step if lanes > 1 else lane_control_step), any_start_rows
 
     @parallel_kernel
     def step(blocks: Array, components: int, segments: int, records: Array) -> None:
         for block in prange(blocks.shape[0]):
-            control_step(blocks[block], components, segments, records, span)
+            advance(blocks[block], components, segments, records, span)
 
     @kernel
     def start(blocks: Array, components: int, records: Array) -> None:
         for block in range(blocks.shape[0]):
-            start_rows(blocks[block], components, records, span)
+            begin(blocks[block], components, records, span)
 
     @kernel
     def deck(blocks: Array, coordinates: Array) -> None:

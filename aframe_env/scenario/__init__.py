@@ -8,6 +8,7 @@ from aframe_env.scenario.scenario import Initial, Scenario
 from aframe_env.scenario.sea import Sea, SeaMotion
 from aframe_env.scenario.sensors import Channel, Sensors
 from aframe_env.scenario.vessel import Vessel
+from aframe_env.scenario.water import LoadShape, Water
 
 __all__ = [
     "GRAVITY",
@@ -18,6 +19,7 @@ __all__ = [
     "Harmonic",
     "HarmonicMotion",
     "Initial",
+    "LoadShape",
     "Range",
     "RecordedMotion",
     "RecordedWindow",
@@ -30,5 +32,6 @@ __all__ = [
     "Sensors",
     "ShipMotion",
     "Vessel",
+    "Water",
     "Winch",
 ]

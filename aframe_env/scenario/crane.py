@@ -69,10 +69,34 @@ class Rope:
     """E_R F_R, N. The default is about a 70 mm six-strand steel rope."""
     breaking_load: float = 3.42e6
     """Tension at which the rope parts, N. Default: 0.356 d² R with d = 70 mm, R = 1960 N/mm² (EN 12385-4)."""
+    mass_per_length: float = 0.0
+    """μ, kg/m; 0 for the paper's rope, which has none. ``six_strand`` has that of the default's construction."""
+    solid_diameter: float = 0.0
+    """Diameter of the solid bar that displaces as much water, m."""
+    tangential_drag: float = 0.008
+    """C_t of water along the rope: ½ ρ C_t π d v² N for each metre, with d the solid diameter."""
+    loss_time: float = 0.0
+    """β, s: time constant of the material's damping, E F (e + β de/dt); adds to a scenario's ``rope_damping``."""
 
     def __post_init__(self) -> None:
         require_number("axial_stiffness", self.axial_stiffness, "N", low=1.0, high=1e12)
         require_number("breaking_load", self.breaking_load, "N", low=1.0, high=1e12)
+        require_number("mass_per_length", self.mass_per_length, "kg/m", low=1e-3, high=1e3, or_zero=True)
+        require_number("solid_diameter", self.solid_diameter, "m", low=0.0, high=1.0)
+        require_number("tangential_drag", self.tangential_drag, "", low=0.0, high=1.0)
+        require_number("loss_time", self.loss_time, "s", low=0.0, high=1.0)
+
+    @classmethod
+    def six_strand(cls, **changes: float) -> Rope:
+        """Return the default rope with the mass, volume and damping of 70 mm of six-strand steel rope.
+
+        ``changes`` replace further fields.
+        """
+        return cls(**{"mass_per_length": 19.55, "solid_diameter": 0.056, "loss_time": 0.01, **changes})
+
+    def weight_per_length(self, gravity: float, density: float) -> float:
+        """Weight of a metre of rope less its buoyancy in a fluid of ``density`` kg/m³, N/m."""
+        return (self.mass_per_length - density * 0.25 * math.pi * self.solid_diameter**2) * gravity
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Final, Literal
 
+from aframe_env.dynamics.start import heavy_lengths, longest_chain_step, springs_of_rope
 from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.scenario.motion import HarmonicMotion, ShipMotion, has_components, is_tabled
+from aframe_env.scenario.water import LoadShape, Water
 from aframe_env.validation import InvalidValue, require_choice, require_instance, require_number, shown
 
 Initial = Literal["comoving", "rest"]
@@ -19,6 +21,8 @@ LEAST_RAMP: Final = 1e-3
 """Shortest build-up that is one, s."""
 FASTEST_BOBBING: Final = 1e4
 """Greatest angular frequency of a load bobbing on its rope, rad/s: the inner step follows it."""
+SHORTEST_CHAIN_STEP: Final = 2.4e-4
+"""Shortest inner step that a rope with mass may ask for, s."""
 FASTEST_DECAY: Final = 1e6
 """Greatest damping of a rope for each kilogram of load, 1/s: the inner step follows it."""
 
@@ -41,6 +45,10 @@ class Scenario:
     """Time over which the ship's motion builds up from nothing, s (a quintic smoothstep); 0 for none."""
     gravity: float = GRAVITY
     """g, m/s²."""
+    water: Water | None = None
+    """Water that rope and load are in; None for air, as in the paper."""
+    load: LoadShape = field(default_factory=LoadShape)
+    """What the water feels of the load."""
 
     def __post_init__(self) -> None:
         require_instance("crane", self.crane, Crane)
@@ -52,6 +60,8 @@ class Scenario:
         require_choice("initial", self.initial, INITIALS)
         require_number("ramp", self.ramp, "s", low=LEAST_RAMP, high=1e4, or_zero=True)
         require_number("gravity", self.gravity, "m/s²", low=1e-3, high=100.0)
+        require_instance("load", self.load, LoadShape)
+        self._require_wet()
         least, most = self.crane.winch.min_rope_length, self.crane.winch.max_rope_length
         pulley = self.crane.pulley_position[2]
         if self.target_level >= pulley:
@@ -59,6 +69,11 @@ class Scenario:
                 f"target_level = {self.target_level!r} m: must be below the pulley, in (-inf, {pulley:g}) m"
             )
         breaking_load = self.crane.rope.breaking_load
+        if self.hanging_weight >= breaking_load > self.weight:
+            raise InvalidValue(
+                f"target_level = {self.target_level!r} m: a rope that weighs {self.rope_weight:g} N/m would bear "
+                f"{self.hanging_weight:g} N with its load: must be below {breaking_load:g} N, at which it parts"
+            )
         if self.weight >= breaking_load:
             raise InvalidValue(
                 f"load_mass = {self.load_mass!r} kg: must be in (0, {breaking_load / self.gravity:g}) kg, for the rope "
@@ -80,6 +95,35 @@ class Scenario:
                 f"rope_damping = {self.rope_damping!r} N s/m: must be in [0, {FASTEST_DECAY * self.load_mass:g}] N s/m "
                 f"with a load of {self.load_mass:g} kg"
             )
+        self._require_chain()
+
+    def _require_wet(self) -> None:
+        """Raise where water, rope and load do not go together."""
+        rope = self.crane.rope
+        if self.water is None:
+            if self.load != LoadShape():
+                raise InvalidValue(f"load = {shown(self.load)}: goes with water, and there is none")
+            return
+        require_instance("water", self.water, Water)
+        if self.rope_weight < 0.0:
+            raise InvalidValue(
+                f"solid_diameter = {rope.solid_diameter!r} m: the rope floats in water of {self.water.density:g} "
+                f"kg/m³: must be at most {2.0 * math.sqrt(rope.mass_per_length / (math.pi * self.water.density)):g} m"
+            )
+        if self.weight <= 0.0:
+            raise InvalidValue(
+                f"volume = {self.load.volume!r} m³: a load of {self.load_mass:g} kg floats: must be below "
+                f"{self.load_mass / self.water.density:g} m³"
+            )
+
+    def _require_chain(self) -> None:
+        """Raise where the waves in the rope are too fast for the inner step."""
+        if self.springs > 1 and self.chain_step < SHORTEST_CHAIN_STEP:
+            raise InvalidValue(
+                f"mass_per_length = {self.crane.rope.mass_per_length!r} kg/m: the waves in the rope need steps of "
+                f"{self.chain_step:.2g} s, must be at least {SHORTEST_CHAIN_STEP:g} s: make it 0 kg/m, or the rope "
+                "heavier, softer or less damped"
+            )
 
     @classmethod
     def paper(cls, initial: Initial = "comoving", rope_damping: float = 0.0, **changes: Any) -> Scenario:
@@ -96,13 +140,69 @@ class Scenario:
 
     @property
     def weight(self) -> float:
-        """Weight of the load, N."""
-        return self.load_mass * self.gravity
+        """Weight of the load, less its buoyancy, N."""
+        return (self.load_mass - self.density * self.load.volume) * self.gravity
+
+    @property
+    def density(self) -> float:
+        """ρ of what is around rope and load, kg/m³; 0 in air."""
+        return 0.0 if self.water is None else self.water.density
+
+    @property
+    def rope_weight(self) -> float:
+        """w, weight of a metre of rope less its buoyancy, N/m."""
+        return self.crane.rope.weight_per_length(self.gravity, self.density) if self.crane.rope.mass_per_length else 0.0
+
+    @property
+    def hanging_weight(self) -> float:
+        """Weight of the load and of the rope below the pulley, N."""
+        return self.weight + self.rope_weight * self.lengths[0]
+
+    @property
+    def is_light(self) -> bool:
+        """Whether the rope has no mass and hangs in air, as the paper's."""
+        return self.water is None and not self.crane.rope.mass_per_length
+
+    def require_light(self, what: str) -> None:
+        """Raise where the rope has mass or hangs in water: ``what`` takes the paper's rope alone."""
+        if not self.is_light:
+            raise InvalidValue(
+                f"mass_per_length = {self.crane.rope.mass_per_length!r} kg/m, water = {shown(self.water)}: {what} take "
+                "a rope without mass in air: must be 0 kg/m, and None"
+            )
+
+    @cached_property
+    def lengths(self) -> tuple[float, float]:
+        """Unstretched rope below the pulley and from there to the drum, m, that hold the load at its target at rest."""
+        axial = self.crane.rope.axial_stiffness
+        return heavy_lengths(self.rope_length, self.crane.drum_to_pulley, self.weight, axial, self.rope_weight)
+
+    @cached_property
+    def springs(self) -> int:
+        """Springs that the rope is divided into, one more than it has lumps of mass; 0 for the paper's rope."""
+        rope = self.crane.rope
+        return 0 if self.is_light else springs_of_rope(self.lengths[0], rope.mass_per_length, self.load_mass)
 
     @cached_property
     def free_length(self) -> float:
         """l_0, m: unstretched length between drum and load that holds the load at its target, ship at rest."""
-        return self.crane.free_length(self.rope_length, self.weight)
+        if self.springs > 1:
+            return sum(self.lengths)
+        return self.crane.free_length(self.rope_length, self.weight + 0.5 * self.rope_weight * self.lengths[0])
+
+    @property
+    def chain_step(self) -> float:
+        """Longest stable inner step for the rope's elements, s, with a tenth of its length wound up."""
+        rope, lumps = self.crane.rope, self.springs - 1
+        mass = self.load_mass + self.load.added_mass_vertical
+        return longest_chain_step(
+            0.9 * self.lengths[0] / lumps, rope.mass_per_length, rope.axial_stiffness, mass, self.loss_time
+        )
+
+    @property
+    def loss_time(self) -> float:
+        """β of the rope's damping, the material's and ``rope_damping``, s."""
+        return self.total_rope_damping / self.rope_stiffness
 
     @property
     def rope_stiffness(self) -> float:
@@ -110,11 +210,24 @@ class Scenario:
         return self.crane.rope.axial_stiffness / self.free_length
 
     @property
+    def moved_mass(self) -> float:
+        """Mass that bobs on the rope, kg: the load's, its added mass, and a third of the rope's below the pulley."""
+        if self.is_light:
+            return self.load_mass
+        rope = self.crane.rope.mass_per_length * self.lengths[0]
+        return self.load_mass + self.load.added_mass_vertical + rope / 3.0
+
+    @property
     def rope_frequency(self) -> float:
-        """Angular frequency of the load bobbing on the rope, rad/s."""
-        return math.sqrt(self.rope_stiffness / self.load_mass)
+        """Angular frequency of the load bobbing on the rope, rad/s; of a heavy rope within 3 % (at three loads)."""
+        return math.sqrt(self.rope_stiffness / self.moved_mass)
+
+    @property
+    def total_rope_damping(self) -> float:
+        """d_R with what the material's loss time adds, N s/m."""
+        return self.rope_damping + self.crane.rope.loss_time * self.rope_stiffness
 
     @property
     def rope_damping_rate(self) -> float:
-        """d_R / m_L, 1/s."""
-        return self.rope_damping / self.load_mass
+        """d_R over the mass that it damps, 1/s."""
+        return self.total_rope_damping / self.moved_mass

@@ -187,6 +187,7 @@ class Objective:
         require_number("duration", duration, "s", low=0.0, high=3600.0, low_open=True)
         require_number("max_step", max_step, "s", low=2e-3, high=0.2)
         require_coverage(scenario.motion, "duration", duration)
+        scenario.require_light("drives")
         self.scenario = scenario
         self.duration = float(duration)
         self.control_period = control_period

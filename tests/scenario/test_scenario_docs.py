@@ -17,6 +17,7 @@ from aframe_env import (
     Crane,
     Frame,
     Harmonic,
+    LoadShape,
     RecordedMotion,
     Rope,
     Scenario,
@@ -24,6 +25,7 @@ from aframe_env import (
     Sea,
     Sensors,
     Vessel,
+    Water,
     Winch,
     read_scenarios,
 )
@@ -48,8 +50,10 @@ TABLES = {
     FrameStructure: "### `[crane.frame.structure]`",
     Material: "`[crane.frame.structure.material]`:",
     Servomotor: "`[crane.frame.structure.servomotor]`:",
+    Water: "## `[water]`",
+    LoadShape: "`[load]`:",
 }
-ELSEWHERE = {"crane", "motion"}
+ELSEWHERE = {"crane", "motion", "water", "load"}
 """Keys of a scenario that have sections of their own."""
 
 
