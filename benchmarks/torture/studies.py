@@ -18,30 +18,28 @@ import numpy as np
 from benchmarks.torture.processes import start
 from benchmarks.torture.trial import Outcome, Trial
 from train.shared.job_store import JOBS
-from train.shared.run_folder import CONFIG, RECORD
 
 COMMANDS: Final = {
     "train.evaluate": "--scenarios 3 --privileged 1 --policies 'output zero' 'feed-forward + feedback' "
-    "'predictive control' 'H-Ω1 for each scenario' --out OUT",
+    "'predictive control' 'H-Ω1 for each scenario' --out out",
     "train.sensitivity": "--policies 'drum still' 'feed-forward + feedback' --scenarios 2 --points 2 --samples 2 "
-    "--workers 1 --out OUT",
-    "train.optimisers": "--scenarios 0 --max-evaluations 50 --limited 1 --limited-evaluations 2 --workers 1 --out OUT",
-    "train.tune": "--trials 4 --timesteps 2048 --scenarios 4 --out OUT",
-    "train.tune_control": "--policies state inverse-dynamics --scenarios 2 --evaluations 8 --out OUT",
-    "train.drives": "--drive harmonic --objective omega1 --duration 6 --max-evaluations 40 --check rfem --out OUT",
-    "train.drive_map": "--amplitudes 1 2 --periods 8 9 --masses 4e4 5e4 --lengths 200 300 --held-out 2 --workers 1 "
-    "--out OUT",
-    "train.verify": "--folder OUT",
+    "--workers 1 --out out",
+    "train.optimisers": "--scenarios 0 --max-evaluations 50 --limited 1 --limited-evaluations 2 --workers 1 --out out",
+    "train.tune": "--trials 4 --timesteps 2048 --scenarios 4 --out out",
+    "train.tune_control": "--policies state inverse-dynamics --scenarios 2 --evaluations 8 --out out",
+    "train.drives": "--drive harmonic --objective omega1 --duration 6 --max-evaluations 40 --check rfem --out out",
+    "train.drive_map": "--amplitudes 1 2 --periods 8 9 --masses 4e4 5e4 --lengths 200 300 --held-out 2 --scenarios 2 "
+    "--workers 1 --out out",
+    "train.verify": "--folder out",
 }
-"""Small runs of every command that keeps its finished jobs."""
+"""Small runs of every command that keeps its finished jobs, in the folder where they start."""
 MEASURED: Final = {
-    "train.evaluate": ("report.html",),
     "train.optimisers": ("comparison.md", "comparison.json"),
     "train.drives": ("notes.md", "summary.csv", "summary.json"),
     "train.drive_map": ("notes.md",),
-    "train.verify": (),
+    "train.verify": ("README.md", "verification.json"),
 }
-"""Files with seconds, or the command line, in them; of JSON all else is looked at."""
+"""Files with seconds in them; of JSON all else is looked at."""
 _PATIENCE: Final = 1800.0
 """Seconds after which a study is no longer waited for."""
 
@@ -87,43 +85,47 @@ class Killed:
             return Outcome(tried, 0, failures=(f"exit status {status}: {said[-1000:]}",))
         if lost:
             return Outcome(tried, 0, failures=(f"{lost} rows of the store lost",))
-        files = contents(folder / "out", self._measured)
+        files = contents(folder / "out", MEASURED.get(self.module, ()))
         differ = sorted(name for name in files.keys() | whole.files.keys() if files.get(name) != whole.files.get(name))
         if differ:
             return Outcome(tried, 0, failures=(f"other bytes in {', '.join(differ)}",))
         return Outcome(tried, tried)
 
-    @property
-    def _measured(self) -> tuple[str, ...]:
-        return (CONFIG, RECORD, *MEASURED.get(self.module, ()))  # the first two name the folder
-
     def _truth(self) -> Whole:
         if self._whole is None:
             with TemporaryDirectory(prefix="torture-") as name:
                 folder, begin = Path(name), time.monotonic()
-                self._start(folder).join(_PATIENCE)
+                process = self._start(folder)
+                process.join(_PATIENCE)
                 seconds = time.monotonic() - begin
-                self._whole = Whole(seconds, contents(folder / "out", self._measured))
+                if process.exitcode != 0:
+                    process.kill()
+                    said = (folder / "said").read_text(encoding="utf-8")
+                    raise RuntimeError(f"{self.module}: exit status {process.exitcode} unkilled: {said[-1000:]}")
+                self._whole = Whole(seconds, contents(folder / "out", MEASURED.get(self.module, ())))
         return self._whole
 
     def _start(self, folder: Path) -> ForkServerProcess:
-        arguments = shlex.split(COMMANDS[self.module].replace("OUT", str(folder / "out")))
-        return start(folder / "said", self.module, *arguments)
+        return start(folder / "said", self.module, *shlex.split(COMMANDS[self.module]), folder=folder)
 
 
 def contents(folder: Path, measured: tuple[str, ...]) -> dict[str, Any]:
-    """What a run wrote, by name; of files that hold seconds too, nothing, or all else if they are JSON."""
-    found: dict[str, Any] = {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
-    for name in measured:
-        data = found.pop(name, b"")
-        if name.endswith(".json") and name != RECORD:
+    """What a run wrote, by path; of files that hold seconds too, nothing, or all else if they are JSON."""
+    found: dict[str, Any] = {}
+    for path in (path for path in folder.rglob("*") if path.is_file()):
+        name, data = path.relative_to(folder).as_posix(), path.read_bytes()
+        if name not in measured:
+            found[name] = data
+        elif path.suffix == ".json":
             found[name] = without_seconds(json.loads(data))
     return found
 
 
 def without_seconds(data: Any) -> Any:
-    """JSON without its measured seconds."""
+    """JSON without its measured seconds, and without the rows of a table that hold them."""
     if isinstance(data, dict):
+        if str(data.get("quantity")).endswith(", s"):
+            return {}
         return {key: without_seconds(value) for key, value in data.items() if key != "seconds"}
     return [without_seconds(each) for each in data] if isinstance(data, list) else data
 

@@ -11,7 +11,8 @@ import pytest
 from rich.console import Console
 
 from benchmarks.torture import __main__ as torture
-from benchmarks.torture import full_disk, kills
+from benchmarks.torture import full_disk, kills, studies
+from benchmarks.torture.processes import start
 from benchmarks.torture.trial import Outcome, Trial
 
 if sys.platform == "win32":
@@ -53,6 +54,32 @@ def test_another_agent_is_told_from_the_same(tmp_path: Path, monkeypatch: pytest
     killed.__dict__["_digest"] = "0" * 64
     outcome = killed.attempt(np.random.default_rng(0), tmp_path, 1)
     assert (outcome.survived, outcome.failures) == (0, ("another agent",))
+
+
+def test_a_command_starts_in_a_folder_and_its_workers_return_what_it_defines(tmp_path: Path) -> None:
+    small = ("--scenarios", 0, "--max-evaluations", 1, "--limited", 0, "--workers", 1, "--out", "out")
+    process = start(tmp_path / "said", "train.optimisers", *small, folder=tmp_path)
+    process.join(300.0)
+    assert process.exitcode == 0, (tmp_path / "said").read_text(encoding="utf-8")
+    assert len(json.loads((tmp_path / "out" / "comparison.json").read_text(encoding="utf-8"))) == 4
+
+
+def test_a_study_that_fails_unkilled_is_not_the_truth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(studies.COMMANDS, "train.drives", "--duration -1 --out out")
+    with pytest.raises(RuntimeError, match=r"(?s)exit status 2 unkilled: .*duration = -1"):
+        studies.Killed("train.drives").attempt(np.random.default_rng(0), tmp_path, 1)
+
+
+def test_all_but_measured_seconds_is_compared(tmp_path: Path) -> None:
+    rows = [{"quantity": "f1, Hz", "measured": "2"}, {"quantity": "modes, s", "measured": "3"}]
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "inner" / "data.json").write_text(json.dumps({"omega1": 1.0, "seconds": 2.0, "rows": rows}))
+    (tmp_path / "inner" / "notes.md").write_text("2 s")
+    (tmp_path / "data.json").write_text("whole")
+    assert studies.contents(tmp_path, ("inner/data.json", "inner/notes.md")) == {
+        "data.json": b"whole",
+        "inner/data.json": {"omega1": 1.0, "rows": [rows[0], {}]},
+    }
 
 
 def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
