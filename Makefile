@@ -52,6 +52,7 @@ results: .venv/installed-test
 		"predictive control (state)" "predictive control" "feed-forward + feedback (state)" "feed-forward + feedback"
 	$(BIN)/python -m train.sensitivity --overwrite --out results/sensitivity
 	$(BIN)/python -m train.verify
+	$(BIN)/python -m train.verify --water --overwrite --folder results/verification/water
 
 test: .venv/installed-test
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)

@@ -8,6 +8,9 @@ into the file that ``--out`` names:
     python -m train.verify --load-case case.toml
     python -m train.verify --release case.toml --out release.json
     python -m train.verify --dynamic case.toml --out run.json
+    python -m train.verify --rope-case case.toml --out run.json
+
+With --water it runs the checks of heavy ropes and loads in water in place of the full model's.
 
 A static case's JSON has the keys of the reference data's cases (aframe_env/data/reference/static.json) and,
 under ``along``, section forces and von Mises stress along the frame. In ``sec_before_…`` and ``sec_after_…``
@@ -40,7 +43,7 @@ from train.shared.cli import parse
 from train.shared.console import PlainConsole
 from train.shared.job_store import JobStore, version_of
 from train.shared.run_folder import RunOptions, new_file, open_jobs, user_errors, write_json, write_text
-from train.verify import frame_checks, run_checks
+from train.verify import frame_checks, rope_cases, rope_checks, run_checks
 from train.verify.cases import (
     FORMAT,
     dynamic_case,
@@ -50,15 +53,19 @@ from train.verify.cases import (
 )
 from train.verify.pictures import draw_all
 from train.verify.report import Check, markdown
+from train.verify.rope_cases import run_rope_case
+from train.verify.rope_pictures import draw_ropes
 
-__doc__ = f"{__doc__}\n{FORMAT}"
+__doc__ = f"{__doc__}\n{FORMAT}\n{rope_cases.FORMAT}"
 
 CASE_KINDS: Mapping[str, Callable[[Mapping[str, Any], Path], dict[str, object]]] = {
     "load_case": lambda data, _: static_case(data),
     "release": lambda data, _: release_case(data),
     "dynamic": dynamic_case,
+    "rope_case": run_rope_case,
 }
 """Functions that run a case, given its file's contents and folder."""
+CASE_OPTIONS = ", ".join(f"--{name.replace('_', '-')}" for name in CASE_KINDS)
 
 
 CHECKS: Sequence[Callable[[], Check | list[Check]]] = (
@@ -74,7 +81,16 @@ CHECKS: Sequence[Callable[[], Check | list[Check]]] = (
     run_checks.steps,
     run_checks.drift,
 )
-"""Every check, in the order of the table."""
+"""Every check of the full model, in the order of the table."""
+WATER_CHECKS: Sequence[Callable[[], Check | list[Check]]] = (
+    rope_checks.cases,
+    rope_checks.statics,
+    rope_checks.frequencies,
+    rope_checks.transfer,
+    rope_checks.massless_limit,
+    rope_checks.energy,
+)
+"""Every check of heavy ropes and loads in water."""
 
 
 @dataclass(frozen=True)
@@ -85,10 +101,12 @@ class Checked:
     seconds: float
 
 
-def run_all(store: JobStore[Checked], console: Console) -> list[Check]:
-    """Run the checks that are not in the store, and return all."""
+def run_all(
+    store: JobStore[Checked], console: Console, wanted: Sequence[Callable[[], Check | list[Check]]]
+) -> list[Check]:
+    """Run those of the wanted checks that are not in the store, and return all."""
     checks: list[Check] = []
-    for check in CHECKS:
+    for check in wanted:
         done = store.get([check.__module__, check.__name__], partial(_timed, check))
         for item in done.checks:
             mark = "ok  " if item.passed else "FAIL"
@@ -110,21 +128,23 @@ def versions() -> dict[str, str]:
     return {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
 
 
-def write_report(checks: Sequence[Check], folder: Path) -> None:
+def write_report(checks: Sequence[Check], folder: Path, water: bool) -> None:
     """Write the table as Markdown and JSON, and the pictures."""
-    pictures = draw_all(folder)
+    pictures = draw_ropes(folder) if water else draw_all(folder)
+    command = "python -m train.verify" + water * " --water"
+    heading = "Verification of heavy ropes and loads in water" if water else "Verification of the full model"
     stated = ", ".join(f"{name} {version}" for name, version in versions().items())
     images = "\n\n".join(f"![{path.stem.replace('_', ' ')}]({path.name})" for path in pictures)
-    footer = f"{images}\n\nMade by `python -m train.verify` ({stated})."
+    footer = f"{images}\n\nMade by `{command}` ({stated})."
     write_json(
         folder / "verification.json",
         {
-            "command": "python -m train.verify",
+            "command": command,
             "versions": versions(),
             "checks": [{**asdict(check), "rows": [asdict(row) for row in check.rows]} for check in checks],
         },
     )
-    write_text(folder / "README.md", markdown(checks, "Verification of the full model", footer))
+    write_text(folder / "README.md", markdown(checks, heading, footer))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,6 +157,10 @@ class Options:
     """Run one release of a static load, from a TOML file."""
     dynamic: Path | None = None
     """Run one case with ship motion, from a TOML file."""
+    rope_case: Path | None = None
+    """Run one case of a load in water on a heavy rope, from a TOML file."""
+    water: bool = False
+    """Check heavy ropes and loads in water, not the full model."""
     out: Path | None = None
     """JSON file for that case's result; by default it is printed."""
     folder: Path | None = None
@@ -148,9 +172,11 @@ class Options:
         if len(self.cases) > 1:
             raise InvalidValue(f"{', '.join(self.cases)}: give one of them")
         if self.cases and self.folder is not None:
-            raise InvalidValue("--folder goes without --load-case, --release and --dynamic: name a file by --out")
+            raise InvalidValue(f"--folder goes without {CASE_OPTIONS}: name a file by --out")
+        if self.cases and self.water:
+            raise InvalidValue(f"--water goes without {CASE_OPTIONS}")
         if self.out is not None and not self.cases:
-            raise InvalidValue("--out goes with --load-case, --release or --dynamic")
+            raise InvalidValue(f"--out goes with one of {CASE_OPTIONS}")
 
     @property
     def cases(self) -> dict[str, Path]:
@@ -180,8 +206,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         run = open_jobs(RunOptions(out=options.folder, overwrite=options.overwrite), "train.verify", "README.md")
         try:
             with JobStore(run.jobs, Checked, version_of(aframe_env, train.verify)) as store:
-                checks = run_all(store, console)
-            write_report(checks, run.folder)
+                checks = run_all(store, console, WATER_CHECKS if options.water else CHECKS)
+            write_report(checks, run.folder, options.water)
         except KeyboardInterrupt:
             console.print("interrupted: what is finished is kept; the same command goes on from there")
             return 130
