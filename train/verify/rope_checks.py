@@ -245,7 +245,7 @@ def transfer() -> Check:
     within = (gaps <= np.maximum(0.01 * np.abs(expected), 1e-3)) & (turned <= 1.0)
     return Check(
         name="motion of the load over that of S, periods of 4 to 20 s",
-        bar="|H| within 1 % or 1e-3, phase within 1°, all 720",
+        bar="magnitude within 1 % or 1e-3, phase within 1°, all 720",
         measured=f"{within.sum()} of {len(within)}; {share.max():.2%}, {turned.max():.2f}° at worst",
         passed=bool(within.all()) and len(within) == 720,
     )
