@@ -335,7 +335,15 @@ def _fill_parameters(row: FloatArray, scenario: Scenario, times: Timing) -> None
         (scenario.load_mass + load.added_mass_horizontal, scenario.load_mass + load.added_mass_vertical),
         scenario.weight,
         (half_density * load.drag_area_horizontal, half_density * load.drag_area_vertical),
+        half_density * rope.across_drag * rope.outer_diameter,
     )
+    if scenario.water is not None:
+        current = np.array(scenario.water.current).reshape(-1, 3)
+        row[at.CURRENT_POINTS] = len(current)
+        row[at.CURRENT : at.CURRENT + len(current)] = scenario.water.surface_level - current[:, 0]
+        for axis in (1, 2):
+            first = at.CURRENT + axis * at.CURRENT_MOST
+            row[first : first + len(current)] = current[:, axis]
 
 
 __all__ = ["Engine", "InvalidValue", "Timing", "timing"]

@@ -25,7 +25,7 @@ from aframe_env.dynamics.blocks import put_three, three
 from aframe_env.dynamics.compiling import fma, larger, scalar, select, smaller
 from aframe_env.dynamics.layout import SPRINGS_MOST, Span
 from aframe_env.dynamics.load import RopeEnd
-from aframe_env.dynamics.vector import Vector, difference, inner
+from aframe_env.dynamics.vector import Vector, add, along, difference, inner, scaled
 
 Array = npt.NDArray[np.float64]
 
@@ -88,6 +88,49 @@ def put_end(row: Array, slot: int, lanes: int, j: int, end: RopeEnd, acceleratio
     put_three(row, slot + END_ACCELERATION, lanes, j, acceleration)
     row[(slot + LENGTH) * lanes + j] = end.length
     row[(slot + PAY_OUT) * lanes + j] = end.pay_out_speed
+
+
+@scalar
+def current(row: Array, level: float, lanes: int, j: int) -> tuple[float, float]:
+    """Current of lane j's water at a level [m]: x and y, m/s; linear between the levels given, constant beyond."""
+    count = int(row[at.CURRENT_POINTS * lanes + j])
+    x, y = row[(at.CURRENT + at.CURRENT_MOST) * lanes + j], row[(at.CURRENT + 2 * at.CURRENT_MOST) * lanes + j]
+    for k in range(1, count):
+        upper, lower = row[(at.CURRENT + k - 1) * lanes + j], row[(at.CURRENT + k) * lanes + j]
+        share = smaller(larger((upper - level) / (upper - lower), 0.0), 1.0)
+        x = fma(share, row[(at.CURRENT + at.CURRENT_MOST + k) * lanes + j] - x, x)
+        y = fma(share, row[(at.CURRENT + 2 * at.CURRENT_MOST + k) * lanes + j] - y, y)
+    return x, y
+
+
+@scalar
+def begin_water(row: Array, span: Span) -> None:
+    """Find the current about the load, and the water's drag across the rope, at the start of a segment.
+
+    Both belong to swings of a minute; they are held over the segment.
+    """
+    lanes = span.stride
+    for j in range(span.begin, span.end):
+        position, velocity = three(row, at.LOAD_POSITION, lanes, j), three(row, at.LOAD_VELOCITY, lanes, j)
+        pulley, pulley_rate = three(row, at.PULLEY, lanes, j), three(row, at.PULLEY + 3, lanes, j)
+        line, turning = difference(position, pulley), difference(velocity, pulley_rate)
+        x, y = current(row, position.z, lanes, j)
+        row[at.FLOW * lanes + j] = x
+        row[(at.FLOW + 1) * lanes + j] = y
+        push, drag = Vector(0.0, 0.0, 0.0), row[at.ACROSS_DRAG * lanes + j]
+        if drag > 0.0:
+            away = math.sqrt(inner(line, line) + 1e-18)
+            axis = scaled(1.0 / away, line)
+            pieces = max(int(row[at.SPRINGS * lanes + j]) - 1, 1)
+            for i in range(pieces):
+                # The middles of equal pieces, as the lumps are but for strain.
+                lever = (i + 0.5) / pieces
+                x, y = current(row, fma(lever, line.z, pulley.z), lanes, j)
+                through = difference(along(pulley_rate, lever, turning), Vector(x, y, 0.0))
+                across = along(through, -inner(axis, through), axis)
+                force = -drag * (away / pieces) * math.sqrt(inner(across, across))
+                push = along(push, lever * force, across)
+        put_three(row, at.PUSH, lanes, j, push)
 
 
 @scalar
@@ -258,14 +301,17 @@ def pull_load(row: Array, source: int, target: int, end: int, fraction: float, w
             fma(carried, pulley.y, spun * turn.y),
             fma(carried, pulley.z, spun * turn.z) - rope_weight * row[(at.STAGE + LEVER) * lanes + j],
         )
+        handed = add(handed, three(row, at.PUSH, lanes, j))
         bottom = row[(at.STAGE + BOTTOM) * lanes + j]
         pull = -bottom - inner(axis, handed)
         across, down = row[at.LOAD_DRAG * lanes + j], row[(at.LOAD_DRAG + 1) * lanes + j]
-        across *= math.sqrt(fma(velocity.x, velocity.x, velocity.y * velocity.y))
+        flow_x = velocity.x - row[at.FLOW * lanes + j]
+        flow_y = velocity.y - row[(at.FLOW + 1) * lanes + j]
+        across *= math.sqrt(fma(flow_x, flow_x, flow_y * flow_y))
         down *= abs(velocity.z)
         force = Vector(
-            fma(pull, axis.x, fma(-across, velocity.x, handed.x)),
-            fma(pull, axis.y, fma(-across, velocity.y, handed.y)),
+            fma(pull, axis.x, fma(-across, flow_x, handed.x)),
+            fma(pull, axis.y, fma(-across, flow_y, handed.y)),
             fma(pull, axis.z, fma(-down, velocity.z, handed.z)) - row[at.LOAD_WEIGHT * lanes + j],
         )
         # (D + J (1 - e eᵀ)) a = force, with D diagonal: Sherman and Morrison's formula.

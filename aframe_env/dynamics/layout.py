@@ -14,6 +14,8 @@ LANES: Final = 64
 """Rows in a block."""
 SPRINGS_MOST: Final = 10
 """Most springs of a rope with mass: one more than it has lumps."""
+CURRENT_MOST: Final = 8
+"""Most depths at which a current is given."""
 
 
 class Span(NamedTuple):
@@ -128,6 +130,12 @@ LOAD_WEIGHT: Final = _take(1)
 """Weight of the load less buoyancy, and half of a rope without lumps, N."""
 LOAD_DRAG: Final = _take(2)
 """Drag of the load at 1 m/s, horizontally and vertically, N s²/m²."""
+ACROSS_DRAG: Final = _take(1)
+"""Drag of a metre of rope at 1 m/s across itself, N s²/m³."""
+CURRENT_POINTS: Final = _take(1)
+"""Levels at which the current is given; 0 for none."""
+CURRENT: Final = _take(3 * CURRENT_MOST)
+"""Levels, m, from above, then the current's x and then its y there, m/s; CURRENT_MOST slots for each."""
 
 # Scratch of one control step.
 DUE: Final = _take(1)
@@ -153,6 +161,10 @@ END_SIZE: Final = 11
 ENDS: Final = _take(3 * END_SIZE)
 """Upper end of the rope at the start, middle and end of the inner step: the pulley's position, velocity and
 acceleration, unstretched length between drum and load, and its rate."""
+FLOW: Final = _take(2)
+"""Current about the load over a segment: x and y, m/s."""
+PUSH: Final = _take(3)
+"""What the drag of water across the rope hands on to the load over a segment, N."""
 STAGE: Final = _take(32)
 """What the parts of a stage tell each other, see ``heavy_rope``."""
 

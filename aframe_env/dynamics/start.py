@@ -136,11 +136,13 @@ def write_heavy(
     inertia: tuple[float, float],
     weight: float,
     drag: tuple[float, float],
+    across_drag: float,
 ) -> None:
     """Write what a rope with mass and a load in water need beside ``write_lift`` into lane j.
 
     ``springs`` of the rope; ``drum_part`` unstretched from drum to pulley, m; ``rope``: mass kg/m, weight N/m, drag
-    N s²/m³, loss time s; the load's ``inertia`` [kg], ``weight`` [N] and ``drag`` [N s²/m²], horizontal and vertical.
+    N s²/m³, loss time s; the load's ``inertia`` [kg], ``weight`` [N] and ``drag`` [N s²/m²], horizontal and vertical;
+    ``across_drag`` of the rope, N s²/m³.
     """
     below = row[at.FREE_LENGTH * lanes + j] - drum_part
     half_weight = 0.5 * rope[1] * below if springs == 1 else 0.0
@@ -157,6 +159,7 @@ def write_heavy(
     row[at.LOAD_WEIGHT * lanes + j] = weight + half_weight
     row[at.LOAD_DRAG * lanes + j] = drag[0]
     row[(at.LOAD_DRAG + 1) * lanes + j] = drag[1]
+    row[at.ACROSS_DRAG * lanes + j] = across_drag
 
 
 def hang_rope(row: Any, lanes: int, j: int, comoving: bool) -> None:

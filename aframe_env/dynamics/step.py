@@ -13,7 +13,7 @@ from numba import prange
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.blocks import put_three, three
 from aframe_env.dynamics.compiling import fma, kernel, larger, parallel_kernel, scalar, select
-from aframe_env.dynamics.heavy_rope import COST, PEAK, SLACKEST, lift_step, put_end, springs_of, stage
+from aframe_env.dynamics.heavy_rope import COST, PEAK, SLACKEST, begin_water, lift_step, put_end, springs_of, stage
 from aframe_env.dynamics.layout import LANES, Span
 from aframe_env.dynamics.load import Load, RopeEnd, load_acceleration, load_constants, rk4_step
 from aframe_env.dynamics.motion import (
@@ -248,6 +248,7 @@ def light_steps(row: Array, count: int, span: Span) -> None:
 @scalar
 def lane_steps(row: Array, count: int, span: Span) -> None:
     """Make the inner steps of a segment, ``count`` at most, with ropes of either kind, lane by lane."""
+    begin_water(row, span)
     for j in range(span.begin, span.end):
         own = Span(span.stride, j, j + 1)
         springs = int(row[at.SPRINGS * span.stride + j])
@@ -265,6 +266,7 @@ def block_steps(row: Array, count: int, span: Span) -> None:
     if most == 0:
         light_steps(row, count, span)
     elif fewest > 0:
+        begin_water(row, span)
         for index in range(count):
             heavy_inner_step(row, index, most, True, span)
     else:

@@ -75,6 +75,10 @@ class Rope:
     """Diameter of the solid bar that displaces as much water, m."""
     tangential_drag: float = 0.008
     """C_t of water along the rope: ½ ρ C_t π d v² N for each metre, with d the solid diameter."""
+    outer_diameter: float = 0.0
+    """Diameter that water across the rope meets, m."""
+    across_drag: float = 1.2
+    """C_n of water across the rope: ½ ρ C_n d v² N for each metre, with d the outer diameter."""
     loss_time: float = 0.0
     """β, s: time constant of the material's damping, E F (e + β de/dt); adds to a scenario's ``rope_damping``."""
 
@@ -84,6 +88,8 @@ class Rope:
         require_number("mass_per_length", self.mass_per_length, "kg/m", low=1e-3, high=1e3, or_zero=True)
         require_number("solid_diameter", self.solid_diameter, "m", low=0.0, high=1.0)
         require_number("tangential_drag", self.tangential_drag, "", low=0.0, high=1.0)
+        require_number("outer_diameter", self.outer_diameter, "m", low=0.0, high=1.0)
+        require_number("across_drag", self.across_drag, "", low=0.0, high=10.0)
         require_number("loss_time", self.loss_time, "s", low=0.0, high=1.0)
 
     @classmethod
@@ -92,7 +98,9 @@ class Rope:
 
         ``changes`` replace further fields.
         """
-        return cls(**{"mass_per_length": 19.55, "solid_diameter": 0.056, "loss_time": 0.01, **changes})
+        return cls(
+            **{"mass_per_length": 19.55, "solid_diameter": 0.056, "outer_diameter": 0.07, "loss_time": 0.01, **changes}
+        )
 
     def weight_per_length(self, gravity: float, density: float) -> float:
         """Weight of a metre of rope less its buoyancy in a fluid of ``density`` kg/m³, N/m."""

@@ -55,6 +55,46 @@ def test_pendulum() -> None:
     assert 2.0 * np.diff(times).mean() == pytest.approx(2.0 * math.pi * math.sqrt(inertia * length / lever), rel=1e-3)
 
 
+def drift(scenario: Scenario, seconds: int) -> FloatArray:
+    """Where the load hangs from the pulley's plumb line in the end, x and y, m."""
+    engine = Engine(1, 0.2)
+    row = engine.row_vector(scenario)
+    engine.write_row(0, row)
+    found = []
+    for _ in range(5 * seconds):
+        engine.step(np.zeros(1))
+        found.append(engine.read_many(at.LOAD_POSITION, 2)[0] - engine.read_many(at.PULLEY, 2)[0])
+    # The mean of the last periods of a swing that dies away slowly.
+    return np.asarray(found[len(found) // 2 :]).mean(axis=0)
+
+
+@pytest.mark.parametrize("below", [60.0, 1000.0])
+def test_drift_in_a_current(below: float) -> None:
+    current = ((0.0, 0.3, -0.4),)
+    load = LoadShape(volume=6.4, drag_area_horizontal=30.0)
+    scenario = steel_load(below, 5e4, load=load, water=Water(current=current))
+    # Drags on load and rope turn the straight rope about the pulley until weight does as much the other way.
+    push = 0.5 * RHO * 0.5**2 * (30.0 + 1.2 * 0.07 * below * 0.5)
+    expected = scenario.rope_length * push / (scenario.weight + 0.5 * scenario.rope_weight * below)
+    assert drift(scenario, 3000) == pytest.approx(expected * np.array([0.6, -0.8]), rel=5e-3)
+
+
+def test_current_is_that_of_its_depth() -> None:
+    """Drag of the rope under a current of the upper water alone, by the integral of lever and velocity squared."""
+    current = ((0.0, 1.0, 0.0), (400.0, 1.0, 0.0), (401.0, 0.0, 0.0))
+    rope = Rope.six_strand(mass_per_length=19.55)
+    scenario = steel_load(1000.0, 5e4, rope=rope, water=Water(current=current, surface_level=0.0))
+    engine = Engine(1, 0.1)
+    engine.reset_row(0, scenario)
+    engine.step(np.zeros(1))
+    pieces = (np.arange(9) + 0.5) / 9.0
+    depths = pieces * scenario.rope_length - scenario.crane.pulley_position[2]
+    per_metre = 0.5 * RHO * 1.2 * 0.07
+    expected = per_metre * scenario.rope_length / 9.0 * pieces[depths < 400.0].sum()
+    assert engine.read(at.PUSH)[0] == pytest.approx(expected, rel=1e-3)
+    assert engine.read_many(at.FLOW, 2)[0] == pytest.approx([0.0, 0.0])
+
+
 def test_fall_reaches_terminal_velocity() -> None:
     load = LoadShape(volume=2.0, added_mass_vertical=1e4, drag_area_vertical=12.0)
     scenario = steel_load(60.0, 2e4, load=load, rope=Rope())
@@ -74,7 +114,7 @@ def mixed() -> list[Scenario]:
     shape = replace(shape, drag_area_horizontal=9.0)
     found = []
     for length, mass in ((60.0, 5e3), (120.0, 2e3), (300.0, 1e5), (700.0, 3e3), (2900.0, 1.5e3), (2900.0, 3e5)):
-        for water, load in ((None, LoadShape()), (Water(), shape)):
+        for water, load in ((None, LoadShape()), (Water(current=((5.0, 0.5, 0.1), (90.0, -0.2, 0.3))), shape)):
             crane = Crane(rope=Rope.six_strand(breaking_load=6e6), winch=LONG_WINCH)
             found.append(
                 Scenario(
@@ -125,6 +165,11 @@ def test_light_load_goes_slack_and_snaps() -> None:
     ("build", "words"),
     [
         (lambda: Water(density=100.0), r"density = 100.0 kg/m³: must be in \[900, 1300\] kg/m³"),
+        (lambda: Water(current=((0.0, 9.0, 0.0),)), r"current\[0\] velocity = 9.0 m/s: must be in \[-5, 5\] m/s"),
+        (
+            lambda: Water(current=((10.0, 1.0, 0.0), (5.0, 1.0, 0.0))),
+            r"current\[1\] depth = 5.0 m, each deeper by 1 m: must be in \[11, 12000\]",
+        ),
         (lambda: LoadShape(volume=-1.0), r"volume = -1.0 m³: must be in \[0, 10000\] m³"),
         (lambda: Rope(mass_per_length=2e3), r"mass_per_length = 2000.0 kg/m: must be 0, or in \[0.001, 1000\] kg/m"),
         (lambda: steel_load(300.0, 1e4, load=LoadShape(volume=20.0)), r"volume = 20.0 m³: a load of 10000 kg floats"),
