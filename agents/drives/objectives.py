@@ -1,6 +1,7 @@
 """Objectives (31) and (32) of a prescribed drum angle, evaluated by the package's own integrator.
 
-Ω1 = ∫ (x_L3 - h)² dt [m² s], Ω2 = max |x_L3 - h| [m] over [0, t_k] on the simplified model; the rope does not part.
+Ω1 = ∫ (x_L3 - h)² dt [m² s], Ω2 = max |x_L3 - h| [m] over [0, t_k] on the simplified model, with heavy ropes and water
+too; the rope does not part.
 As in the paper, the drum follows the drive exactly; or, where a control period is given, as the winch can from rest,
 within its limits of speed and acceleration, which is what ``DrivePolicy`` makes of the drive in the environment.
 """
@@ -17,10 +18,12 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.blocks import three
+from aframe_env.dynamics.blocks import put_three, three
 from aframe_env.dynamics.compiling import kernel, scalar
+from aframe_env.dynamics.heavy_rope import COST, begin_water, lift_step, put_end
+from aframe_env.dynamics.layout import Span
 from aframe_env.dynamics.load import Load, RopeEnd, load_constants, rk4_step
-from aframe_env.dynamics.start import inner_steps
+from aframe_env.dynamics.start import hang_rope, inner_steps
 from aframe_env.dynamics.vector import Vector
 from aframe_env.engine import Engine
 from aframe_env.scenario import Scenario
@@ -66,8 +69,12 @@ class Outcome:
 
 
 def coarse_step(scenario: Scenario) -> float:
-    """Inner step [s] at which Ω1 is right to 1e-4: RK4 turns the load's bobbing by at most COARSE_PHASE."""
-    return min(COARSE_STEP, COARSE_PHASE / scenario.rope_frequency)
+    """Inner step [s] at which Ω1 is right to 1e-4: RK4 turns the load's bobbing by at most COARSE_PHASE.
+
+    A rope with mass may ask for a shorter one.
+    """
+    step = min(COARSE_STEP, COARSE_PHASE / scenario.rope_frequency)
+    return min(step, scenario.chain_step) if scenario.springs > 1 else step
 
 
 class _Drum(NamedTuple):
@@ -120,6 +127,39 @@ def _kernel() -> Callable[..., tuple[float, float, float]]:
             load, cost, _ = rk4_step(load, start, middle, end, h, target, constants)
             omega1 += cost
             error = load.position.z - target
+            errors[i + 1] = error
+            lowest = min(lowest, error)
+            highest = max(highest, error)
+        return omega1, lowest, highest
+
+    return evaluate
+
+
+@cache
+def _heavy_kernel() -> Callable[..., tuple[float, float, float]]:
+    """As ``_kernel``, for a row whose rope has mass or whose load is in water, and which hangs as it starts."""
+    span = Span(1, 0, 1)
+
+    @kernel
+    def evaluate(path, angle, speed, row, h, errors):  # type: ignore[no-untyped-def]
+        target, drum = row[at.TARGET], _drum(row)  # type: ignore[no-untyped-call]
+        springs = int(row[at.SPRINGS])
+        row[at.STEP_LENGTH] = h
+        omega1 = 0.0
+        lowest = highest = errors[0] = row[at.LOAD_POSITION + 2] - target
+        for i in range((path.shape[0] - 1) // 2):
+            for part in range(3):
+                k = 2 * i + part
+                point = path[k]
+                end = _rope_end(point, angle[k], speed[k], drum)  # type: ignore[no-untyped-call]
+                put_end(row, at.ENDS + part * at.END_SIZE, 1, 0, end, Vector(point[6], point[7], point[8]))
+                if part == 0:
+                    put_three(row, at.PULLEY, 1, 0, end.position)
+                    put_three(row, at.PULLEY + 3, 1, 0, end.velocity)
+            begin_water(row, span)
+            lift_step(row, springs, False, span)
+            omega1 += h * (1.0 / 6.0) * row[at.STAGE + COST]
+            error = row[at.LOAD_POSITION + 2] - target
             errors[i + 1] = error
             lowest = min(lowest, error)
             highest = max(highest, error)
@@ -187,7 +227,8 @@ class Objective:
         require_number("duration", duration, "s", low=0.0, high=3600.0, low_open=True)
         require_number("max_step", max_step, "s", low=2e-3, high=0.2)
         require_coverage(scenario.motion, "duration", duration)
-        scenario.require_light("drives")
+        if scenario.springs > 1:
+            max_step = min(max_step, scenario.chain_step)
         self.scenario = scenario
         self.duration = float(duration)
         self.control_period = control_period
@@ -203,20 +244,18 @@ class Objective:
         engine = Engine(1, 0.5 * self.step, max_inner_step=0.2)
         engine.reset_row(0, scenario)
         row, still = engine.blocks[0], np.zeros(1)
-        self.path = np.empty((len(self.times), 6))
-        """(2 steps + 1, 6): pulley's position and velocity at ``times``, base frame."""
-        self.path[0] = row[at.PULLEY : at.PULLEY + 6]
+        self.path = np.empty((len(self.times), 9))
+        """(2 steps + 1, 9): pulley's position, velocity and acceleration at ``times``, base frame."""
+        self.path[0] = row[at.PULLEY : at.PULLEY + 9]
         at_start = engine.copy_row(0)
         for i in range(1, len(self.times)):
             engine.step(still)
-            self.path[i] = row[at.PULLEY : at.PULLEY + 6]
-        self._row = engine.copy_row(0)
-        """The engine's row of the scenario, its load at the start."""
-        for slot in (at.LOAD_POSITION, at.LOAD_VELOCITY):
-            self._row[slot : slot + 3] = at_start[slot : slot + 3]
+            self.path[i] = row[at.PULLEY : at.PULLEY + 9]
+        self._row = at_start
+        """The engine's row of the scenario at the start."""
         crane = scenario.crane
         # A drum that starts at φ has paid out r φ of rope, which the load stretches, before the start.
-        self._lowering = crane.winch.drum_radius * (1.0 + scenario.weight / crane.rope.axial_stiffness)
+        self._lowering = crane.winch.drum_radius * (1.0 + scenario.hanging_weight / crane.rope.axial_stiffness)
         self._errors = np.empty(self.steps + 1)
 
     def evaluate(self, angle: FloatArray, speed: FloatArray) -> Outcome:
@@ -225,8 +264,22 @@ class Objective:
 
     def _evaluate(self, angle: FloatArray, speed: FloatArray) -> Outcome:
         """Outcome of the drum's angle [rad] and speed [rad/s] at ``times``."""
-        omega1, lowest, highest = _kernel()(self.path, angle, speed, self._row, self._lowering, self.step, self._errors)
+        if self.scenario.is_light:
+            arguments = self.path, angle, speed, self._row, self._lowering, self.step, self._errors
+            omega1, lowest, highest = _kernel()(*arguments)
+        else:
+            row = self._hung(float(angle[0]))
+            omega1, lowest, highest = _heavy_kernel()(self.path, angle, speed, row, self.step, self._errors)
         return Outcome(omega1, max(-lowest, highest), lowest, highest, self.duration)
+
+    def _hung(self, angle: float) -> FloatArray:
+        """Row of a rope with mass at the start, its drum at ``angle`` rad."""
+        row = self._row.copy()
+        row[at.FREE_LENGTH] += row[at.DRUM_RADIUS] * angle
+        hang_rope(row, 1, 0, self.scenario.initial == "comoving")
+        row[at.FREE_LENGTH] = self._row[at.FREE_LENGTH]
+        row[at.LOAD_POSITION + 2] -= self._lowering * angle
+        return row
 
     def drum(self, angle: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Angle [rad] and speed [rad/s] of the drum at ``times``, under a drive's at ``samples``."""
@@ -253,6 +306,11 @@ class Objective:
             moved = np.array(neighbours) - drum
             more_angle, more_speed = np.ascontiguousarray(moved.transpose(1, 2, 0))
         errors = np.empty((self.steps + 1, more_angle.shape[1]))
+        if not self.scenario.is_light:
+            for k, (more, faster) in enumerate(zip(more_angle.T, more_speed.T, strict=True)):
+                self._evaluate(drum[0] + more, drum[1] + faster)
+                errors[:, k] = self._errors
+            return errors
         _lanes_kernel()(self.path, *drum, more_angle, more_speed, self._row, self._lowering, self.step, errors)
         return errors
 
