@@ -251,8 +251,10 @@ class Objective:
         for i in range(1, len(self.times)):
             engine.step(still)
             self.path[i] = row[at.PULLEY : at.PULLEY + 9]
-        self._row = at_start
-        """The engine's row of the scenario at the start."""
+        self._row = engine.copy_row(0)
+        """The engine's row of the scenario, load, rope and pulley as at the start."""
+        for slot, size in ((at.LIFT, at.LIFT_SIZE), (at.PULLEY, 9), (at.PARTED, 1)):
+            self._row[slot : slot + size] = at_start[slot : slot + size]
         crane = scenario.crane
         # A drum that starts at φ has paid out r φ of rope, which the load stretches, before the start.
         self._lowering = crane.winch.drum_radius * (1.0 + scenario.hanging_weight / crane.rope.axial_stiffness)
