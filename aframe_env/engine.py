@@ -54,8 +54,7 @@ def timing(scenario: Scenario, control_period: float, max_inner_step: float | No
     segments = math.ceil(control_period / MAX_SEGMENT - 1e-9)
     segment = control_period / segments
     longest = max_inner_step or longest_inner_step(scenario.rope_frequency, scenario.rope_damping_rate)
-    if scenario.springs > 1:
-        longest = min(longest, scenario.chain_step)
+    longest = min(longest, scenario.chain_step)
     return Timing(segments, segment, inner_steps(segment, longest))
 
 

@@ -21,7 +21,7 @@ LEAST_RAMP: Final = 1e-3
 """Shortest build-up that is one, s."""
 FASTEST_BOBBING: Final = 1e4
 """Greatest angular frequency of a load bobbing on its rope, rad/s: the inner step follows it."""
-SHORTEST_CHAIN_STEP: Final = 2.4e-4
+SHORTEST_CHAIN_STEP: Final = 1e-4
 """Shortest inner step that a rope with mass may ask for, s."""
 FASTEST_DECAY: Final = 1e6
 """Greatest damping of a rope for each kilogram of load, 1/s: the inner step follows it."""
@@ -118,7 +118,7 @@ class Scenario:
 
     def _require_chain(self) -> None:
         """Raise where the waves in the rope are too fast for the inner step."""
-        if self.springs > 1 and self.chain_step < SHORTEST_CHAIN_STEP:
+        if self.chain_step < SHORTEST_CHAIN_STEP:
             raise InvalidValue(
                 f"mass_per_length = {self.crane.rope.mass_per_length!r} kg/m: the waves in the rope need steps of "
                 f"{self.chain_step:.2g} s, must be at least {SHORTEST_CHAIN_STEP:g} s: make it 0 kg/m, or the rope "
@@ -192,8 +192,10 @@ class Scenario:
 
     @property
     def chain_step(self) -> float:
-        """Longest stable inner step for the rope's elements, s, with a tenth of its length wound up."""
+        """Longest stable inner step for the rope, s, with a tenth of its length wound up; inf without lumps."""
         rope, lumps = self.crane.rope, self.springs - 1
+        if lumps < 1:
+            return math.inf
         mass = self.load_mass + self.load.added_mass_vertical
         return longest_chain_step(
             0.9 * self.lengths[0] / lumps, rope.mass_per_length, rope.axial_stiffness, mass, self.loss_time

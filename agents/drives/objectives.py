@@ -73,8 +73,7 @@ def coarse_step(scenario: Scenario) -> float:
 
     A rope with mass may ask for a shorter one.
     """
-    step = min(COARSE_STEP, COARSE_PHASE / scenario.rope_frequency)
-    return min(step, scenario.chain_step) if scenario.springs > 1 else step
+    return min(COARSE_STEP, COARSE_PHASE / scenario.rope_frequency, scenario.chain_step)
 
 
 class _Drum(NamedTuple):
@@ -227,8 +226,7 @@ class Objective:
         require_number("duration", duration, "s", low=0.0, high=3600.0, low_open=True)
         require_number("max_step", max_step, "s", low=2e-3, high=0.2)
         require_coverage(scenario.motion, "duration", duration)
-        if scenario.springs > 1:
-            max_step = min(max_step, scenario.chain_step)
+        max_step = min(max_step, scenario.chain_step)
         self.scenario = scenario
         self.duration = float(duration)
         self.control_period = control_period

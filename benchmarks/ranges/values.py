@@ -15,7 +15,7 @@ from typing import Any, Final
 from hypothesis import assume
 from hypothesis import strategies as st
 
-from aframe_env import Crane, InvalidValue, Scenario, ScenarioDistribution, Sensors
+from aframe_env import Crane, InvalidValue, LoadShape, Scenario, ScenarioDistribution, Sensors, Water
 from aframe_env.scenario.motion import COORDINATES, Harmonic, HarmonicMotion, ShipMotion
 from aframe_env.scenario.scenario import INITIALS
 from aframe_env.scenario.sea import SPECTRA, Sea, SeaMotion
@@ -131,6 +131,15 @@ def motions(draw: st.DrawFn) -> ShipMotion:
 
 
 @st.composite
+def waters(draw: st.DrawFn) -> dict[str, Any]:
+    """Water of any density and current, and what it feels of a load."""
+    velocities = st.floats(-5.0, 5.0)
+    depths = draw(st.lists(st.integers(0, 5000), max_size=8, unique=True))
+    current = tuple((float(depth), draw(velocities), draw(velocities)) for depth in sorted(depths))
+    return {"water": replace(changed(Water(), draw), current=current), "load": changed(LoadShape(), draw)}
+
+
+@st.composite
 def scenarios(draw: st.DrawFn) -> Scenario:
     """Scenarios from all over the ranges."""
     crane, motion = draw(cranes()), draw(motions())
@@ -147,6 +156,8 @@ def scenarios(draw: st.DrawFn) -> Scenario:
     names = [name for name in ranges if draw(st.booleans())]
     changes = {name: draw(ranges[name].values) for name in names if name != "target_level"}
     changes["initial"] = draw(st.sampled_from(INITIALS))
+    if draw(st.booleans()):
+        changes |= draw(waters())
     scenario: Scenario = made(lambda: replace(start, **changes))
     return scenario
 
