@@ -125,7 +125,8 @@ def _cached(function: F, **options: Any) -> F:
     # that compile at once, one could later be given the other's variant. A name of its own for each keeps them apart.
     cells = [cell.cell_contents for cell in function.__closure__ or ()]
     own_source = Path(function.__code__.co_filename).read_bytes()
-    variant = hashlib.sha256(f"{source_digest()} {cells!r} {options} ".encode() + own_source).hexdigest()[:16]
+    described = f"{source_digest()} {cells!r} {function.__code__.co_names} {options} "
+    variant = hashlib.sha256(described.encode() + own_source).hexdigest()[:16]
     function.__qualname__ += f"-{variant}"
     _kernels.add(function)
     compiled = njit(**options, **_OPTIONS)(function)

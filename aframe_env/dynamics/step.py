@@ -338,19 +338,36 @@ def step_kernels(lanes: int = LANES, heavy: bool = False) -> StepKernels:
     ``heavy``: for ropes with mass and loads in water too.
     """
     span = Span(lanes, 0, lanes)
-    advance, begin = control_step, start_rows
-    if heavy:
-        advance, begin = (block_control_step if lanes > 1 else lane_control_step), any_start_rows
+    # Functions of the module by name: numba's cache never finds a kernel again that closes over a compiled one.
+    if not heavy:
 
-    @parallel_kernel
-    def step(blocks: Array, components: int, segments: int, records: Array) -> None:
-        for block in prange(blocks.shape[0]):
-            advance(blocks[block], components, segments, records, span)
+        @parallel_kernel
+        def step(blocks: Array, components: int, segments: int, records: Array) -> None:
+            for block in prange(blocks.shape[0]):
+                control_step(blocks[block], components, segments, records, span)
 
-    @kernel
-    def start(blocks: Array, components: int, records: Array) -> None:
-        for block in range(blocks.shape[0]):
-            begin(blocks[block], components, records, span)
+        @kernel
+        def start(blocks: Array, components: int, records: Array) -> None:
+            for block in range(blocks.shape[0]):
+                start_rows(blocks[block], components, records, span)
+    else:
+        if lanes == 1:
+
+            @parallel_kernel
+            def step(blocks: Array, components: int, segments: int, records: Array) -> None:
+                for block in prange(blocks.shape[0]):
+                    lane_control_step(blocks[block], components, segments, records, span)
+        else:
+
+            @parallel_kernel
+            def step(blocks: Array, components: int, segments: int, records: Array) -> None:
+                for block in prange(blocks.shape[0]):
+                    block_control_step(blocks[block], components, segments, records, span)
+
+        @kernel
+        def start(blocks: Array, components: int, records: Array) -> None:
+            for block in range(blocks.shape[0]):
+                any_start_rows(blocks[block], components, records, span)
 
     @kernel
     def deck(blocks: Array, coordinates: Array) -> None:
