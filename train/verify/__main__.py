@@ -176,7 +176,7 @@ class Options:
         if self.cases and self.water:
             raise InvalidValue(f"--water goes without {CASE_OPTIONS}")
         if self.out is not None and not self.cases:
-            raise InvalidValue(f"--out goes with one of {CASE_OPTIONS}")
+            raise InvalidValue(f"--out goes with {CASE_OPTIONS}")
 
     @property
     def cases(self) -> dict[str, Path]:
