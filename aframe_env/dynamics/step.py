@@ -124,6 +124,22 @@ def rope_ends(row: Array, index: int, active: bool, lanes: int, j: int) -> tuple
 
 
 @scalar
+def keep_figures(row: Array, lanes: int, j: int, active: bool, cost: float, peak: float, slack: bool) -> None:
+    """Add an inner step to lane j's figures: its cost, how far off the load is, peak tension, slackness, parting."""
+    row[at.STEP_COST * lanes + j] += cost
+    # What is never negative is taken by its magnitude, PARTED through its complement: these are the same numbers,
+    # but the compiler would see that a store changes nothing and leave it out in some lanes, as in ``select``.
+    error = row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j]
+    row[at.OMEGA2 * lanes + j] = larger(abs(error), abs(row[at.OMEGA2 * lanes + j]))
+    # A lane that stands still has met its pulley and drum beyond the segment: what it felt there is no tension.
+    row[at.SLACK * lanes + j] = larger(select(active & slack, 1.0, 0.0), abs(row[at.SLACK * lanes + j]))
+    peak = select(active, peak, 0.0)
+    row[at.PEAK_TENSION * lanes + j] = larger(peak, abs(row[at.PEAK_TENSION * lanes + j]))
+    intact = 1.0 - row[at.PARTED * lanes + j]
+    row[at.PARTED * lanes + j] = 1.0 - select(peak > row[at.BREAKING_LOAD * lanes + j], 0.0, intact)
+
+
+@scalar
 def inner_step(row: Array, index: int, span: Span) -> None:
     """Make inner step ``index`` of the segment in every lane that has so many (the others stand still)."""
     lanes = span.stride
@@ -142,16 +158,7 @@ def inner_step(row: Array, index: int, span: Span) -> None:
         )
         put_three(row, at.LOAD_POSITION, lanes, j, load.position)
         put_three(row, at.LOAD_VELOCITY, lanes, j, load.velocity)
-        row[at.STEP_COST * lanes + j] += cost
-        # What is never negative is taken by its magnitude, PARTED through its complement: these are the same numbers,
-        # but the compiler would see that a store changes nothing and leave it out in some lanes, as in ``select``.
-        row[at.OMEGA2 * lanes + j] = larger(abs(load.position.z - target), abs(row[at.OMEGA2 * lanes + j]))
-        # A lane that stands still has met its pulley and drum beyond the segment: what it felt there is no tension.
-        slack = active & (peak <= 0.0)
-        row[at.SLACK * lanes + j] = larger(select(slack, 1.0, 0.0), abs(row[at.SLACK * lanes + j]))
-        peak = select(active, peak, 0.0)
-        row[at.PEAK_TENSION * lanes + j] = larger(peak, abs(row[at.PEAK_TENSION * lanes + j]))
-        row[at.PARTED * lanes + j] = 1.0 - select(peak > row[at.BREAKING_LOAD * lanes + j], 0.0, intact)
+        keep_figures(row, lanes, j, active, cost, peak, peak <= 0.0)
 
 
 @scalar
@@ -170,23 +177,14 @@ def heavy_inner_step(row: Array, index: int, most: int, unrolled: bool, span: Sp
         row[at.STEP_LENGTH * lanes + j] = select(active, full, 0.0)
     lift_step(row, most, unrolled, span)
     for j in range(span.begin, span.end):
-        # Each as in ``inner_step``.
-        active = row[at.STEP_LENGTH * lanes + j] > 0.0
-        row[at.STEP_COST * lanes + j] += (
-            row[at.STEP_LENGTH * lanes + j] * (1.0 / 6.0) * row[(at.STAGE + COST) * lanes + j]
-        )
-        error = row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j]
-        row[at.OMEGA2 * lanes + j] = larger(abs(error), abs(row[at.OMEGA2 * lanes + j]))
-        slack = active & (row[(at.STAGE + SLACKEST) * lanes + j] <= 0.0)
-        row[at.SLACK * lanes + j] = larger(select(slack, 1.0, 0.0), abs(row[at.SLACK * lanes + j]))
-        peak = select(active, row[(at.STAGE + PEAK) * lanes + j], 0.0)
-        row[at.PEAK_TENSION * lanes + j] = larger(peak, abs(row[at.PEAK_TENSION * lanes + j]))
-        intact = 1.0 - row[at.PARTED * lanes + j]
-        row[at.PARTED * lanes + j] = 1.0 - select(peak > row[at.BREAKING_LOAD * lanes + j], 0.0, intact)
+        step = row[at.STEP_LENGTH * lanes + j]
+        cost = step * (1.0 / 6.0) * row[(at.STAGE + COST) * lanes + j]
+        slack = row[(at.STAGE + SLACKEST) * lanes + j] <= 0.0
+        keep_figures(row, lanes, j, step > 0.0, cost, row[(at.STAGE + PEAK) * lanes + j], slack)
 
 
 @scalar
-def measure_heavy(row: Array, most: int, unrolled: bool, span: Span) -> None:
+def measure_heavy(row: Array, most: int, span: Span) -> None:
     """Measure tensions and slackness of lanes whose ropes have mass at their present state."""
     lanes = span.stride
     for j in range(span.begin, span.end):
@@ -197,7 +195,7 @@ def measure_heavy(row: Array, most: int, unrolled: bool, span: Span) -> None:
         put_end(row, at.ENDS, lanes, j, end, three(row, at.PULLEY + 6, lanes, j))
         row[at.STEP_LENGTH * lanes + j] = 0.0
         row[(at.STAGE + SLACKEST) * lanes + j] = 1.0
-    stage(row, at.LIFT, at.LIFT_A, at.ENDS, 0.5, 1.0, most, unrolled, span)
+    stage(row, at.LIFT, at.LIFT_A, at.ENDS, 0.5, 1.0, most, False, span)
     for j in range(span.begin, span.end):
         slack = row[(at.STAGE + SLACKEST) * lanes + j] <= 0.0
         row[at.SLACK * lanes + j] = 1.0 if slack else row[at.SLACK * lanes + j]
@@ -235,7 +233,7 @@ def measure_any(row: Array, span: Span) -> None:
         if springs == 0:
             measure_tension(row, own)
         else:
-            measure_heavy(row, springs, False, own)
+            measure_heavy(row, springs, own)
 
 
 @scalar

@@ -81,6 +81,15 @@ def steel_load(below: float, mass: float, added: float = 0.0, rope: Rope | None 
     return replace(probe, target_level=crane.pulley_position[2] - hanging)
 
 
+def chain_masses(scenario: Scenario) -> tuple[float, FloatArray]:
+    """Rope's mass that the load carries, kg, and those of the lumps, from below, (n,) kg."""
+    lumps = scenario.springs - 1
+    element = scenario.crane.rope.mass_per_length * scenario.lengths[0] / lumps
+    masses = np.full(lumps, element)
+    masses[0] *= 1.0 - lumps / (3.0 * (2 * lumps - 1))
+    return element / 6.0, masses
+
+
 class Linear:
     """The engine's vertical equations about rest, x' = A x + B (z_S, z_S'), by differences of what it computes.
 
@@ -99,12 +108,10 @@ class Linear:
         rest = self._engine.row_vector(scenario)
         self.a = np.stack([self._slope(partial_row(rest, at.LIFT + slot)) for slot in self._slots], axis=1)
         self.b = np.stack([self._slope(self._heaved(scenario, rest, turn)) for turn in (0.5 * math.pi, 0.0)], axis=1)
-        element = scenario.crane.rope.mass_per_length * scenario.lengths[0] / lumps
-        masses = np.full(lumps, element)
-        masses[0] *= 1.0 - lumps / (3.0 * (2 * lumps - 1))
+        carried, masses = chain_masses(scenario)
         speeds = range(lumps, 2 * lumps)
         self.a[speeds, speeds] -= rope_drag * scenario.lengths[0] / lumps / masses
-        self.a[-1, -1] -= load_drag / (rest[at.LOAD_INERTIA + 1] + element / 6.0)
+        self.a[-1, -1] -= load_drag / (rest[at.LOAD_INERTIA + 1] + carried)
 
     def _heaved(self, scenario: Scenario, rest: FloatArray, phase: float) -> Callable[[float], FloatArray]:
         """Rows at rest but for the pulley's place (phase π/2) or velocity (phase 0)."""
@@ -276,7 +283,7 @@ def massless_limit() -> Check:
 
 def _energy(row: FloatArray, scenario: Scenario) -> float:
     """Kinetic, potential and elastic energy of load and rope under a pulley at rest, J, by their definitions."""
-    lumps, mass = scenario.springs - 1, scenario.crane.rope.mass_per_length
+    lumps = scenario.springs - 1
     place, speed = row[at.LIFT :][: lumps + 1], row[at.LIFT + at.SPRINGS_MOST :][: lumps + 1]
     position, velocity = row[at.LOAD_POSITION :][:3], row[at.LOAD_VELOCITY :][:3]
     line = position - row[at.PULLEY : at.PULLEY + 3]
@@ -285,9 +292,8 @@ def _energy(row: FloatArray, scenario: Scenario) -> float:
     turn = (velocity - axis * (axis @ velocity)) / distance
     below, drum_part = scenario.lengths
     element = below / lumps
-    masses = np.full(lumps, mass * element)
-    masses[0] *= 1.0 - lumps / (3.0 * (2 * lumps - 1))
-    kinetic = 0.5 * (scenario.load_mass + mass * element / 6.0) * velocity @ velocity
+    carried, masses = chain_masses(scenario)
+    kinetic = 0.5 * (scenario.load_mass + carried) * velocity @ velocity
     kinetic += 0.5 * masses @ (speed[1:] ** 2 + (place[1:] * np.linalg.norm(turn)) ** 2)
     potential = scenario.weight * position[2] + scenario.rope_weight * element * (place[1:] * axis[2]).sum()
     ends = np.concatenate([[distance], place[1:], [-scenario.crane.drum_to_pulley]])
