@@ -1,5 +1,5 @@
 from .config import TaskConfig
-from .scenario.crane import Crane, Frame, Rope, Winch
+from .scenario.crane import Compensator, Crane, Frame, Rope, Winch
 from .scenario.distribution import ScenarioDistribution
 from .scenario.file import read_scenario, read_scenarios, scenario_text
 from .scenario.motion import Harmonic, HarmonicMotion
@@ -7,8 +7,9 @@ from .scenario.recorded_motion import RecordedMotion, RecordedWindow
 from .scenario.scenario import Scenario
 from .scenario.sea import Sea, SeaMotion
 from .scenario.sensors import Channel, Sensors
+from .scenario.target import TargetPath
 from .scenario.vessel import Vessel
-from .scenario.water import LoadShape, Water
+from .scenario.water import LoadShape, Seabed, Water
 from .validation import (
     InvalidValue,
     RecordNoiseWarning,
@@ -23,6 +24,7 @@ __version__: str
 __all__ = [
     "ENV_ID",
     "Channel",
+    "Compensator",
     "Crane",
     "Frame",
     "Harmonic",
@@ -39,8 +41,10 @@ __all__ = [
     "Sea",
     "SeaBeyondTableWarning",
     "SeaMotion",
+    "Seabed",
     "Sensors",
     "SmallRotationWarning",
+    "TargetPath",
     "TaskConfig",
     "Vessel",
     "Water",

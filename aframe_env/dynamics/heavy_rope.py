@@ -15,127 +15,66 @@ A single spring without lumps, and with the rope's mass at nought, is the simpli
 from __future__ import annotations
 
 import math
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.blocks import put_three, three
+from aframe_env.dynamics.compensator import give, slide_of
 from aframe_env.dynamics.compiling import fma, larger, scalar, select, smaller
 from aframe_env.dynamics.layout import SPRINGS_MOST, Span
-from aframe_env.dynamics.load import RopeEnd
-from aframe_env.dynamics.vector import Vector, add, along, difference, inner, scaled
-
-Array = npt.NDArray[np.float64]
-
-# Places in LIFT and the stages after it.
-SPEED: Final = SPRINGS_MOST
-POSITION: Final = 2 * SPRINGS_MOST
-VELOCITY: Final = POSITION + 3
-
-# Places in one of ENDS.
-END_VELOCITY: Final = 3
-END_ACCELERATION: Final = 6
-LENGTH: Final = 9
-PAY_OUT: Final = 10
-
-# Places in STAGE.
-(
-    AXIS,
-    _,
-    _,
-    TURN,
-    _,
-    _,
+from aframe_env.dynamics.lift import (
     AWAY_RATE,
-    NEARNESS,
-    PULLEY_SPEED,
-    CARRIED,
-    TURN_SQUARED,
-    SINKING,
-    ELEMENT,
-    INVERSE_ELEMENT,
-    STIFFNESS,
-    TOP_LENGTH,
-    TOP_STIFFNESS,
-    TOP_LOSS,
-    PAID_OUT,
-    PASSING,
-    INVERSE_MASS,
-    SOFTNESS,
+    AXIS,
     BELOW,
     BOTTOM,
-    LEAST,
-    LEVER,
-    MASS_LEVER,
-    MASS_LEVER_SQUARED,
-    MASS_LEVER_RATE,
-    PEAK,
-    SLACKEST,
+    CARRIED,
     COST,
-) = range(32)
+    ELEMENT,
+    END_VELOCITY,
+    GIVEN_RATE,
+    GROUND,
+    INVERSE_ELEMENT,
+    INVERSE_MASS,
+    LEAST,
+    LENGTH,
+    LEVER,
+    LOAD_SHARE,
+    MASS_LEVER,
+    MASS_LEVER_RATE,
+    MASS_LEVER_SQUARED,
+    NEARNESS,
+    PAID_OUT,
+    PASSING,
+    PAY_OUT,
+    PEAK,
+    POSITION,
+    PULLEY_SPEED,
+    SINKING,
+    SLACKEST,
+    SLIDE,
+    SOFTNESS,
+    SPEED,
+    STIFFNESS,
+    STROKE,
+    TOP_LENGTH,
+    TOP_LOSS,
+    TOP_STIFFNESS,
+    TURN,
+    TURN_SQUARED,
+    VELOCITY,
+    advance_slot,
+)
+from aframe_env.dynamics.vector import Vector, difference
+from aframe_env.dynamics.wet_load import pull_load
 
-LOAD_SHARE: Final = 1.0 / 6.0
-"""Share of an element's mass that the load carries for the lowest lump."""
-
-
-@scalar
-def put_end(row: Array, slot: int, lanes: int, j: int, end: RopeEnd, acceleration: Vector) -> None:
-    """Write the rope's upper end to ENDS."""
-    put_three(row, slot, lanes, j, end.position)
-    put_three(row, slot + END_VELOCITY, lanes, j, end.velocity)
-    put_three(row, slot + END_ACCELERATION, lanes, j, acceleration)
-    row[(slot + LENGTH) * lanes + j] = end.length
-    row[(slot + PAY_OUT) * lanes + j] = end.pay_out_speed
-
-
-@scalar
-def current(row: Array, level: float, lanes: int, j: int) -> tuple[float, float]:
-    """Current of lane j's water at a level [m]: x and y, m/s; linear between the levels given, constant beyond."""
-    count = int(row[at.CURRENT_POINTS * lanes + j])
-    x, y = row[(at.CURRENT + at.CURRENT_MOST) * lanes + j], row[(at.CURRENT + 2 * at.CURRENT_MOST) * lanes + j]
-    for k in range(1, count):
-        upper, lower = row[(at.CURRENT + k - 1) * lanes + j], row[(at.CURRENT + k) * lanes + j]
-        share = smaller(larger((upper - level) / (upper - lower), 0.0), 1.0)
-        x = fma(share, row[(at.CURRENT + at.CURRENT_MOST + k) * lanes + j] - x, x)
-        y = fma(share, row[(at.CURRENT + 2 * at.CURRENT_MOST + k) * lanes + j] - y, y)
-    return x, y
-
-
-@scalar
-def begin_water(row: Array, span: Span) -> None:
-    """Find the current about the load, and the water's drag across the rope, at the start of a segment.
-
-    Both belong to swings of a minute; they are held over the segment.
-    """
-    lanes = span.stride
-    for j in range(span.begin, span.end):
-        position, velocity = three(row, at.LOAD_POSITION, lanes, j), three(row, at.LOAD_VELOCITY, lanes, j)
-        pulley, pulley_rate = three(row, at.PULLEY, lanes, j), three(row, at.PULLEY + 3, lanes, j)
-        line, turning = difference(position, pulley), difference(velocity, pulley_rate)
-        x, y = current(row, position.z, lanes, j)
-        row[at.FLOW * lanes + j] = x
-        row[(at.FLOW + 1) * lanes + j] = y
-        push, drag = Vector(0.0, 0.0, 0.0), row[at.ACROSS_DRAG * lanes + j]
-        if drag > 0.0:
-            away = math.sqrt(inner(line, line) + 1e-18)
-            axis = scaled(1.0 / away, line)
-            pieces = max(int(row[at.SPRINGS * lanes + j]) - 1, 1)
-            for i in range(pieces):
-                # The middles of equal pieces, as the lumps are but for strain.
-                lever = (i + 0.5) / pieces
-                x, y = current(row, fma(lever, line.z, pulley.z), lanes, j)
-                through = difference(along(pulley_rate, lever, turning), Vector(x, y, 0.0))
-                across = along(through, -inner(axis, through), axis)
-                force = -drag * (away / pieces) * math.sqrt(inner(across, across))
-                push = along(push, lever * force, across)
-        put_three(row, at.PUSH, lanes, j, push)
+Array = npt.NDArray[np.float64]
 
 
 @scalar
 def aim(row: Array, source: int, end: int, span: Span) -> None:
-    """Find the line from pulley to load, its turning, and what all springs of the rope have in common."""
+    """Find the line from pulley to load, and its turning."""
     lanes = span.stride
     for j in range(span.begin, span.end):
         position, velocity = three(row, source + POSITION, lanes, j), three(row, source + VELOCITY, lanes, j)
@@ -164,8 +103,16 @@ def aim(row: Array, source: int, end: int, span: Span) -> None:
             turn.x, pulley_rate.x, fma(turn.y, pulley_rate.y, turn.z * pulley_rate.z)
         )
         row[(at.STAGE + TURN_SQUARED) * lanes + j] = fma(turn.x, turn.x, fma(turn.y, turn.y, turn.z * turn.z))
+
+
+@scalar
+def divide(row: Array, source: int, end: int, span: Span) -> None:
+    """Find what all springs of the rope have in common."""
+    lanes = span.stride
     for j in range(span.begin, span.end):
-        length, pay_out = row[(end + LENGTH) * lanes + j], row[(end + PAY_OUT) * lanes + j]
+        # What a compensator gives is paid out as the drum's rope is.
+        length = row[(end + LENGTH) * lanes + j] + row[(source + STROKE) * lanes + j]
+        pay_out = row[(end + PAY_OUT) * lanes + j] + row[(at.STAGE + GIVEN_RATE) * lanes + j]
         lumps, axial = row[at.SPRINGS * lanes + j] - 1.0, row[at.AXIAL_STIFFNESS * lanes + j]
         bare = lumps <= 0.0
         share = 1.0 / select(bare, 1.0, lumps)
@@ -178,7 +125,11 @@ def aim(row: Array, source: int, end: int, span: Span) -> None:
         row[(at.STAGE + INVERSE_ELEMENT) * lanes + j] = inverse
         row[(at.STAGE + STIFFNESS) * lanes + j] = axial * inverse
         row[(at.STAGE + TOP_LENGTH) * lanes + j] = top_length
-        row[(at.STAGE + TOP_STIFFNESS) * lanes + j] = intact * axial / top_length
+        slide = row[at.SHEAVE_FRICTION * lanes + j] * slide_of(row[(end + PAY_OUT) * lanes + j])
+        row[(at.STAGE + SLIDE) * lanes + j] = 1.0 + slide
+        row[(at.STAGE + TOP_STIFFNESS) * lanes + j] = (
+            intact * axial / fma(slide, row[at.DRUM_PART * lanes + j], top_length)
+        )
         # A single spring has the constant damping of eq. (26), the elements of a chain their material's.
         constant = row[at.ROPE_DAMPING * lanes + j] * top_length / axial
         row[(at.STAGE + TOP_LOSS) * lanes + j] = select(bare, constant, row[at.LOSS_TIME * lanes + j])
@@ -192,28 +143,6 @@ def aim(row: Array, source: int, end: int, span: Span) -> None:
         row[(at.STAGE + MASS_LEVER) * lanes + j] = 0.0
         row[(at.STAGE + MASS_LEVER_SQUARED) * lanes + j] = 0.0
         row[(at.STAGE + MASS_LEVER_RATE) * lanes + j] = 0.0
-
-
-@scalar
-def advance_slot(
-    row: Array, slot: int, rate: float, source: int, target: int, fraction: float, weight: float, lanes: int, j: int
-) -> None:
-    """Carry one quantity of LIFT over to ``target``, its rate at this stage being known.
-
-    The stages before the last look ahead from LIFT by ``fraction`` of the step; the last, which has LIFT itself for
-    its target, adds all of their rates up.
-    """
-    h = row[at.STEP_LENGTH * lanes + j]
-    state = row[(at.LIFT + slot) * lanes + j]
-    if source == at.LIFT:
-        row[(at.LIFT_SUM + slot) * lanes + j] = rate
-        row[(target + slot) * lanes + j] = fma(fraction * h, rate, state)
-    elif target == at.LIFT:
-        total = row[(at.LIFT_SUM + slot) * lanes + j] + rate
-        row[(at.LIFT + slot) * lanes + j] = fma(h * (1.0 / 6.0), total, state)
-    else:
-        row[(at.LIFT_SUM + slot) * lanes + j] = fma(weight, rate, row[(at.LIFT_SUM + slot) * lanes + j])
-        row[(target + slot) * lanes + j] = fma(fraction * h, rate, state)
 
 
 @scalar
@@ -282,69 +211,6 @@ def spring(row: Array, i: int, source: int, target: int, fraction: float, weight
 
 
 @scalar
-def pull_load(row: Array, source: int, target: int, end: int, fraction: float, weight: float, span: Span) -> None:
-    """Accelerate the load by the rope's lowest spring, by weight, buoyancy and drag, and by the rope's turning."""
-    lanes = span.stride
-    for j in range(span.begin, span.end):
-        axis, turn = three(row, at.STAGE + AXIS, lanes, j), three(row, at.STAGE + TURN, lanes, j)
-        velocity = three(row, source + VELOCITY, lanes, j)
-        bare = row[at.SPRINGS * lanes + j] == 1.0
-        element = select(bare, 0.0, row[(at.STAGE + ELEMENT) * lanes + j])
-        rope_mass, rope_weight = row[at.ROPE_MASS * lanes + j] * element, row[at.ROPE_WEIGHT * lanes + j] * element
-        # What the rope's lumps, held on the line, hand on to the load by the lever rule.
-        squared = row[(at.STAGE + MASS_LEVER_SQUARED) * lanes + j]
-        carried = rope_mass * (squared - row[(at.STAGE + MASS_LEVER) * lanes + j])
-        spun = -2.0 * rope_mass * row[(at.STAGE + MASS_LEVER_RATE) * lanes + j]
-        pulley = three(row, end + END_ACCELERATION, lanes, j)
-        handed = Vector(
-            fma(carried, pulley.x, spun * turn.x),
-            fma(carried, pulley.y, spun * turn.y),
-            fma(carried, pulley.z, spun * turn.z) - rope_weight * row[(at.STAGE + LEVER) * lanes + j],
-        )
-        handed = add(handed, three(row, at.PUSH, lanes, j))
-        bottom = row[(at.STAGE + BOTTOM) * lanes + j]
-        pull = -bottom - inner(axis, handed)
-        across, down = row[at.LOAD_DRAG * lanes + j], row[(at.LOAD_DRAG + 1) * lanes + j]
-        flow_x = velocity.x - row[at.FLOW * lanes + j]
-        flow_y = velocity.y - row[(at.FLOW + 1) * lanes + j]
-        across *= math.sqrt(fma(flow_x, flow_x, flow_y * flow_y))
-        down *= abs(velocity.z)
-        force = Vector(
-            fma(pull, axis.x, fma(-across, flow_x, handed.x)),
-            fma(pull, axis.y, fma(-across, flow_y, handed.y)),
-            fma(pull, axis.z, fma(-down, velocity.z, handed.z)) - row[at.LOAD_WEIGHT * lanes + j],
-        )
-        # (D + J (1 - e eᵀ)) a = force, with D diagonal: Sherman and Morrison's formula.
-        turned = rope_mass * squared
-        own = fma(LOAD_SHARE, rope_mass, turned)
-        inverse = 1.0 / (row[at.LOAD_INERTIA * lanes + j] + own)
-        inverse_z = 1.0 / (row[(at.LOAD_INERTIA + 1) * lanes + j] + own)
-        eased = Vector(inverse * axis.x, inverse * axis.y, inverse_z * axis.z)
-        more = turned * inner(eased, force) / (1.0 - turned * inner(eased, axis))
-        acceleration = Vector(
-            fma(more, eased.x, inverse * force.x),
-            fma(more, eased.y, inverse * force.y),
-            fma(more, eased.z, inverse_z * force.z),
-        )
-        intact, half_weight = 1.0 - row[at.PARTED * lanes + j], row[at.HALF_WEIGHT * lanes + j]
-        tension = fma(intact, half_weight, row[(at.STAGE + BELOW) * lanes + j])
-        row[at.TENSION * lanes + j] = tension
-        carried_too = LOAD_SHARE * rope_mass * inner(axis, acceleration)
-        row[at.LOAD_TENSION * lanes + j] = larger(bottom - half_weight + carried_too, 0.0)
-        row[(at.STAGE + PEAK) * lanes + j] = larger(row[(at.STAGE + PEAK) * lanes + j], tension)
-        slackest = row[(at.STAGE + SLACKEST) * lanes + j]
-        row[(at.STAGE + SLACKEST) * lanes + j] = smaller(slackest, row[(at.STAGE + LEAST) * lanes + j])
-        error = row[(source + POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j]
-        row[(at.STAGE + COST) * lanes + j] = fma(weight, error * error, row[(at.STAGE + COST) * lanes + j])
-        advance_slot(row, POSITION, velocity.x, source, target, fraction, weight, lanes, j)
-        advance_slot(row, POSITION + 1, velocity.y, source, target, fraction, weight, lanes, j)
-        advance_slot(row, POSITION + 2, velocity.z, source, target, fraction, weight, lanes, j)
-        advance_slot(row, VELOCITY, acceleration.x, source, target, fraction, weight, lanes, j)
-        advance_slot(row, VELOCITY + 1, acceleration.y, source, target, fraction, weight, lanes, j)
-        advance_slot(row, VELOCITY + 2, acceleration.z, source, target, fraction, weight, lanes, j)
-
-
-@scalar
 def stage(
     row: Array,
     source: int,
@@ -361,6 +227,8 @@ def stage(
     ``unrolled``: springs by constant numbers, which the compiler vectorises over the lanes but takes long to compile.
     """
     aim(row, source, end, span)
+    give(row, source, target, end, fraction, weight, span)
+    divide(row, source, end, span)
     if unrolled:
         spring(row, 0, source, target, fraction, weight, span)
         if most > 1:
@@ -389,6 +257,7 @@ def lift_step(row: Array, most: int, unrolled: bool, span: Span) -> None:
         row[(at.STAGE + PEAK) * lanes + j] = 0.0
         row[(at.STAGE + SLACKEST) * lanes + j] = math.inf
         row[(at.STAGE + COST) * lanes + j] = 0.0
+        row[(at.STAGE + GROUND) * lanes + j] = 0.0
     start, middle, end = at.ENDS, at.ENDS + at.END_SIZE, at.ENDS + 2 * at.END_SIZE
     if unrolled:
         stage(row, at.LIFT, at.LIFT_A, start, 0.5, 1.0, most, unrolled, span)

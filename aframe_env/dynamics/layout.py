@@ -16,6 +16,8 @@ SPRINGS_MOST: Final = 10
 """Most springs of a rope with mass: one more than it has lumps."""
 CURRENT_MOST: Final = 8
 """Most depths at which a current is given."""
+PROFILE_MOST: Final = 16
+"""Most corners of a target's path in time."""
 
 
 class Span(NamedTuple):
@@ -46,6 +48,8 @@ LIFT: Final = _take(2 * SPRINGS_MOST)
 both along the line from pulley to load. The load's position and velocity follow."""
 LOAD_POSITION: Final = _take(3)
 LOAD_VELOCITY: Final = _take(3)
+STROKE: Final = _take(1)
+"""Rope that a passive compensator has paid out, m."""
 DRUM_ANGLE: Final = _take(1)
 DRUM_SPEED: Final = _take(1)
 COMMAND: Final = _take(1)
@@ -76,6 +80,18 @@ PARTED: Final = _take(1)
 """1 from the moment at which the tension passed the breaking load."""
 LOAD_TENSION: Final = _take(1)
 """Tension of a rope with mass at the load; TENSION is that at the pulley."""
+ON_BED: Final = _take(1)
+"""1 while the load is on the seabed."""
+CONTACT: Final = _take(1)
+"""Greatest force of the seabed on the load within the last control step, N."""
+LANDINGS: Final = _take(1)
+"""Times that the load has come down on the seabed."""
+LIFT_OFFS: Final = _take(1)
+"""Times that it has left it again."""
+LANDING_SPEED: Final = _take(1)
+"""Greatest speed with which it has come down, m/s."""
+TARGET_RATE: Final = _take(1)
+"""Velocity of the target, m/s."""
 
 # Parameters.
 MASS: Final = _take(1)
@@ -136,6 +152,53 @@ CURRENT_POINTS: Final = _take(1)
 """Levels at which the current is given; 0 for none."""
 CURRENT: Final = _take(3 * CURRENT_MOST)
 """Levels, m, from above, then the current's x and then its y there, m/s; CURRENT_MOST slots for each."""
+SURFACE_LEVEL: Final = _take(1)
+"""Mean level of the sea's surface, m."""
+WAVES: Final = _take(1)
+"""Wave components that move the water about the load; 0 for none."""
+START_SHARE: Final = _take(1)
+"""Share of the load that is under water at rest; LOAD_WEIGHT is the weight there."""
+BUOYANCY: Final = _take(1)
+"""Weight of the water that the load displaces, all of it under water, N."""
+DISPLACED: Final = _take(1)
+"""Mass of that water, kg."""
+ADDED_MASS: Final = _take(2)
+"""Added mass of the load under water, horizontally and vertically, kg; LOAD_INERTIA has it."""
+HALF_HEIGHT: Final = _take(1)
+"""Half the height of the load, m."""
+INVERSE_HEIGHT: Final = _take(1)
+"""One over the height, 1/m; 0 where it has none, and counts as under water wherever it is."""
+SLAM: Final = _take(2)
+"""Force of the surface on the load at 1 m/s, when it enters and when it leaves the water, N s²/m²."""
+BED: Final = _take(3)
+"""Seabed: level [m], stiffness [N/m], damping [N s/m]; without one it is infinitely deep."""
+LEVEL: Final = _take(1)
+"""Target at the start, m."""
+CORNERS: Final = _take(1)
+"""Corners of the target's path; 0 where it holds."""
+CORNER_TIME: Final = _take(1)
+"""Time that the target takes round a corner, s."""
+PROFILE: Final = _take(2 * PROFILE_MOST)
+"""Times of the corners, s, then by how much the target's velocity changes there, m/s; PROFILE_MOST slots for each."""
+RATED_ACCELERATION: Final = _take(1)
+"""Drum's acceleration limit apart from torque, rad/s²; MAX_ACCELERATION is the one in force over a segment."""
+MAX_POWER: Final = _take(1)
+"""W; 0 for no limit."""
+MAX_TORQUE: Final = _take(1)
+"""N m; 0 for no limit."""
+DRUM_INERTIA: Final = _take(1)
+"""kg m²."""
+LAYER: Final = _take(4)
+"""Rope layers on the drum: height [m], turns in each, radius of the innermost [m], all the rope there is [m]; height 0
+where the radius does not change."""
+LENGTH_LIMITS: Final = _take(2)
+"""Least and greatest unstretched length between drum and load, m."""
+SHEAVE_FRICTION: Final = _take(1)
+"""Share by which the tensions on both sides of the turning pulley differ."""
+GAS: Final = _take(4)
+"""Passive compensator: force of its gas at mid-stroke [N], length of its gas column [m], exponent, damping [N s/m]."""
+HALF_STROKE: Final = _take(1)
+"""Half the stroke of a passive compensator, m of rope; 0 for none."""
 
 # Scratch of one control step.
 DUE: Final = _take(1)
@@ -149,23 +212,29 @@ STIFFNESS: Final = _take(1)
 """c_R of the rope at the start of the inner step."""
 STEP_LENGTH: Final = _take(1)
 """Length of the inner step; 0 where the row stands still."""
-LIFT_SIZE: Final = 2 * SPRINGS_MOST + 6
-"""Slots from LIFT to the load's velocity."""
+LIFT_SIZE: Final = 2 * SPRINGS_MOST + 7
+"""Slots from LIFT to the compensator's stroke."""
 LIFT_A: Final = _take(LIFT_SIZE)
 """Nodes and load as in LIFT at a stage of the Runge-Kutta scheme."""
 LIFT_B: Final = _take(LIFT_SIZE)
 """The same at the stage after."""
 LIFT_SUM: Final = _take(LIFT_SIZE)
 """Weighted sum of the stages' rates."""
-END_SIZE: Final = 11
+END_SIZE: Final = 12
 ENDS: Final = _take(3 * END_SIZE)
 """Upper end of the rope at the start, middle and end of the inner step: the pulley's position, velocity and
-acceleration, unstretched length between drum and load, and its rate."""
-FLOW: Final = _take(2)
-"""Current about the load over a segment: x and y, m/s."""
+acceleration, unstretched length between drum and load, its rate, and the target's level."""
+FLOW: Final = _take(3)
+"""Velocity of the water about the load at the start of a segment, m/s."""
+FLOW_RATE: Final = _take(3)
+"""Its acceleration over the segment, m/s²."""
+SURFACE: Final = _take(2)
+"""Level of the surface about the load at the start of a segment, m, and its rate, m/s."""
+MOMENT: Final = _take(1)
+"""Time since the start of the segment at which the water about the load is taken, s."""
 PUSH: Final = _take(3)
 """What the drag of water across the rope hands on to the load over a segment, N."""
-STAGE: Final = _take(32)
+STAGE: Final = _take(35)
 """What the parts of a stage tell each other, see ``heavy_rope``."""
 
 ROW_SLOTS: Final = _next()
@@ -178,7 +247,13 @@ TURN_IM: Final = 3
 FREQUENCY: Final = 4
 RESPONSE: Final = 5
 """Six complex amplitudes: real parts at RESPONSE + dof, imaginary parts at RESPONSE + 6 + dof."""
-COMPONENT_SLOTS: Final = 17
+ELEVATION_RE: Final = 17
+ELEVATION_IM: Final = 18
+"""Complex amplitude of the sea's elevation under the pulley at rest, m; where the water moves about the load."""
+TOWARDS_X: Final = 19
+TOWARDS_Y: Final = 20
+"""Direction that the wave travels in, on the deck's axes."""
+COMPONENT_SLOTS: Final = 21
 UNROLL: Final = 4
 """Wave components are summed this many at a time; a row has room for a multiple of it."""
 

@@ -62,6 +62,24 @@ def springs_of_rope(below: float, mass_per_length: float, load_mass: float) -> i
     return 8 if below < 500.0 else at.SPRINGS_MOST
 
 
+def radius_of_layer(length: float, height: float, turns: float, innermost: float, rope: float) -> float:
+    """Radius [m] at which the rope runs off a drum from which ``length`` m have been paid out.
+
+    Layers of ``turns`` turns each, the centre line of the ``innermost`` at that radius [m], each ``height`` m further
+    out; ``rope`` m in all, the inner layers filled first.
+    """
+    radius, left = innermost, rope - length
+    while left > 2.0 * math.pi * radius * turns:
+        left -= 2.0 * math.pi * radius * turns
+        radius += height
+    return radius
+
+
+def share_under_water(depth: float, height: float) -> float:
+    """Share of a load under water, the middle of its ``height`` m being ``depth`` m deep; without height all of it."""
+    return min(max(depth / height + 0.5, 0.0), 1.0) if height > 0.0 else 1.0
+
+
 def longest_chain_step(
     element: float, mass_per_length: float, axial_stiffness: float, load_mass: float, loss_time: float
 ) -> float:
@@ -138,7 +156,7 @@ def write_heavy(
     drag: tuple[float, float],
     across_drag: float,
 ) -> None:
-    """Write what a rope with mass and a load in water need beside ``write_lift`` into lane j.
+    """Write what a rope with mass and its load need beside ``write_lift`` into lane j; in deep water, if in any.
 
     ``springs`` of the rope; ``drum_part`` unstretched from drum to pulley, m; ``rope``: mass kg/m, weight N/m, drag
     N s²/m³, loss time s; the load's ``inertia`` [kg], ``weight`` [N] and ``drag`` [N s²/m²], horizontal and vertical;

@@ -13,8 +13,10 @@ from numba import prange
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.blocks import put_three, three
 from aframe_env.dynamics.compiling import fma, kernel, larger, parallel_kernel, scalar, select
-from aframe_env.dynamics.heavy_rope import COST, PEAK, SLACKEST, begin_water, lift_step, put_end, springs_of, stage
+from aframe_env.dynamics.drum import limit_drum
+from aframe_env.dynamics.heavy_rope import lift_step, springs_of, stage
 from aframe_env.dynamics.layout import LANES, Span
+from aframe_env.dynamics.lift import COST, END_TARGET, GROUND, PEAK, SLACKEST, put_end
 from aframe_env.dynamics.load import Load, RopeEnd, load_acceleration, load_constants, rk4_step
 from aframe_env.dynamics.motion import (
     advance_motion,
@@ -24,6 +26,8 @@ from aframe_env.dynamics.motion import (
     pulley_on_path,
     start_motion,
 )
+from aframe_env.dynamics.target import move_target
+from aframe_env.dynamics.water import begin_water
 from aframe_env.dynamics.winch import drum_state, next_error, plan
 
 Array = npt.NDArray[np.float64]
@@ -162,6 +166,23 @@ def inner_step(row: Array, index: int, span: Span) -> None:
 
 
 @scalar
+def meet_bed(row: Array, span: Span) -> None:
+    """Count landings and lift-offs of an inner step that has been made, and keep the seabed's greatest force."""
+    lanes = span.stride
+    for j in range(span.begin, span.end):
+        force = select(row[at.STEP_LENGTH * lanes + j] > 0.0, row[(at.STAGE + GROUND) * lanes + j], 0.0)
+        row[at.CONTACT * lanes + j] = larger(force, abs(row[at.CONTACT * lanes + j]))
+        bottom = row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.HALF_HEIGHT * lanes + j]
+        before, now = row[at.ON_BED * lanes + j], select(bottom < row[at.BED * lanes + j], 1.0, 0.0)
+        landed = now > before
+        row[at.LANDINGS * lanes + j] += select(landed, 1.0, 0.0)
+        row[at.LIFT_OFFS * lanes + j] += select(now < before, 1.0, 0.0)
+        speed = select(landed, -row[(at.LOAD_VELOCITY + 2) * lanes + j], 0.0)
+        row[at.LANDING_SPEED * lanes + j] = larger(speed, abs(row[at.LANDING_SPEED * lanes + j]))
+        row[at.ON_BED * lanes + j] = now
+
+
+@scalar
 def heavy_inner_step(row: Array, index: int, most: int, unrolled: bool, span: Span) -> None:
     """Make inner step ``index`` in lanes whose ropes have mass or whose loads are in water, as ``inner_step`` does."""
     lanes = span.stride
@@ -175,9 +196,13 @@ def heavy_inner_step(row: Array, index: int, most: int, unrolled: bool, span: Sp
         put_end(row, at.ENDS + at.END_SIZE, lanes, j, middle, half)
         put_end(row, at.ENDS + 2 * at.END_SIZE, lanes, j, end, pulley_acceleration_on_path(row, place + full, lanes, j))
         row[at.STEP_LENGTH * lanes + j] = select(active, full, 0.0)
+        row[at.MOMENT * lanes + j] = place + 0.5 * full - since_node
+    move_target(row, span)
     lift_step(row, most, unrolled, span)
+    meet_bed(row, span)
     for j in range(span.begin, span.end):
         step = row[at.STEP_LENGTH * lanes + j]
+        row[at.TARGET * lanes + j] = row[(at.ENDS + 2 * at.END_SIZE + END_TARGET) * lanes + j]
         cost = step * (1.0 / 6.0) * row[(at.STAGE + COST) * lanes + j]
         slack = row[(at.STAGE + SLACKEST) * lanes + j] <= 0.0
         keep_figures(row, lanes, j, step > 0.0, cost, row[(at.STAGE + PEAK) * lanes + j], slack)
@@ -195,6 +220,8 @@ def measure_heavy(row: Array, most: int, span: Span) -> None:
         put_end(row, at.ENDS, lanes, j, end, three(row, at.PULLEY + 6, lanes, j))
         row[at.STEP_LENGTH * lanes + j] = 0.0
         row[(at.STAGE + SLACKEST) * lanes + j] = 1.0
+        # What the water does has been followed to the middle of the last inner step; it goes on to its end.
+        row[at.MOMENT * lanes + j] = select(row[at.MOMENT * lanes + j] > 0.0, row[at.CONTROL_PERIOD * lanes + j], 0.0)
     stage(row, at.LIFT, at.LIFT_A, at.ENDS, 0.5, 1.0, most, False, span)
     for j in range(span.begin, span.end):
         slack = row[(at.STAGE + SLACKEST) * lanes + j] <= 0.0
@@ -225,6 +252,13 @@ def measure_tension(row: Array, span: Span) -> None:
 
 
 @scalar
+def plan_any(row: Array, span: Span) -> None:
+    """Plan the winches of lanes with ropes of either kind, by what power and torque allow."""
+    limit_drum(row, span)
+    plan_winch(row, span)
+
+
+@scalar
 def measure_any(row: Array, span: Span) -> None:
     """Measure tension and slackness of lanes with ropes of either kind."""
     for j in range(span.begin, span.end):
@@ -234,6 +268,17 @@ def measure_any(row: Array, span: Span) -> None:
             measure_tension(row, own)
         else:
             measure_heavy(row, springs, own)
+
+
+@scalar
+def start_any(row: Array, span: Span) -> None:
+    """Meet the water, and measure tension and slackness of lanes with ropes of either kind, at the start."""
+    lanes = span.stride
+    for j in range(span.begin, span.end):
+        # The start is a node.
+        row[at.ELAPSED * lanes + j] = row[at.NODE_SEGMENTS * lanes + j] * row[at.CONTROL_PERIOD * lanes + j]
+    begin_water(row, span)
+    measure_any(row, span)
 
 
 @scalar
@@ -272,9 +317,12 @@ def block_steps(row: Array, count: int, span: Span) -> None:
 
 
 def _step_of(
-    inner_steps: Callable[[Array, int, Span], None], measure: Callable[[Array, Span], None]
+    plan_winches: Callable[[Array, Span], None],
+    inner_steps: Callable[[Array, int, Span], None],
+    measure: Callable[[Array, Span], None],
+    measure_start: Callable[[Array, Span], None],
 ) -> tuple[Callable[..., None], Callable[..., None]]:
-    """Control step and start of a block, by how the inner steps are made and the tension is measured."""
+    """Control step and start of a block, by how winches are planned, inner steps made, and tensions measured."""
 
     @scalar
     def control_step(row: Array, components: int, segments: int, records: Array, span: Span) -> None:
@@ -284,10 +332,11 @@ def _step_of(
             row[at.STEP_COST * lanes + j] = 0.0
             row[at.PEAK_TENSION * lanes + j] = 0.0
             row[at.SLACK * lanes + j] = 0.0
+            row[at.CONTACT * lanes + j] = 0.0
             most = row[at.SUBSTEPS * lanes + j] if row[at.SUBSTEPS * lanes + j] > most else most
         for _ in range(segments):
             advance_motion(row, components, records, span)
-            plan_winch(row, span)
+            plan_winches(row, span)
             begin_load(row, span)
             inner_steps(row, int(most), span)
             end_motion(row, span)
@@ -301,7 +350,7 @@ def _step_of(
         for j in range(span.begin, span.end):
             row[at.SLACK * lanes + j] = 0.0
         start_motion(row, components, records, span)
-        measure(row, span)
+        measure_start(row, span)
         for j in range(span.begin, span.end):
             row[at.PEAK_TENSION * lanes + j] = row[at.TENSION * lanes + j]
 
@@ -311,9 +360,9 @@ def _step_of(
 # Control step of a block by ``segments`` motion segments, the command held; and pose of deck and pulley with the rope's
 # tension at the rows' time, before the first step. With the paper's rope alone; and with ropes of either kind, which
 # takes long to compile and gives the paper's rope the same bits: lane by lane, and in whole blocks.
-control_step, start_rows = _step_of(light_steps, measure_tension)
-lane_control_step, any_start_rows = _step_of(lane_steps, measure_any)
-block_control_step, _ = _step_of(block_steps, measure_any)
+control_step, start_rows = _step_of(plan_winch, light_steps, measure_tension, measure_tension)
+lane_control_step, any_start_rows = _step_of(plan_any, lane_steps, measure_any, start_any)
+block_control_step, _ = _step_of(plan_any, block_steps, measure_any, start_any)
 
 
 class StepKernels(NamedTuple):

@@ -1,19 +1,21 @@
 """Scenarios: crane, ship motion, sea, vessel, sensors and load of an episode; fixed, drawn, or read from a file."""
 
-from aframe_env.scenario.crane import GRAVITY, Crane, Frame, Rope, Winch
+from aframe_env.scenario.crane import GRAVITY, Compensator, Crane, Frame, Rope, Winch
 from aframe_env.scenario.distribution import NUMBERS, Range, ScenarioDistribution, ScenarioSource
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion, ShipMotion
 from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
 from aframe_env.scenario.scenario import Initial, Scenario
 from aframe_env.scenario.sea import Sea, SeaMotion
 from aframe_env.scenario.sensors import Channel, Sensors
+from aframe_env.scenario.target import TargetPath
 from aframe_env.scenario.vessel import Vessel
-from aframe_env.scenario.water import LoadShape, Water
+from aframe_env.scenario.water import LoadShape, Seabed, Water
 
 __all__ = [
     "GRAVITY",
     "NUMBERS",
     "Channel",
+    "Compensator",
     "Crane",
     "Frame",
     "Harmonic",
@@ -29,8 +31,10 @@ __all__ = [
     "ScenarioSource",
     "Sea",
     "SeaMotion",
+    "Seabed",
     "Sensors",
     "ShipMotion",
+    "TargetPath",
     "Vessel",
     "Water",
     "Winch",

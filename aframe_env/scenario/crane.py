@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from aframe_env.dynamics.start import free_length
+from aframe_env.dynamics.start import free_length, radius_of_layer
 from aframe_env.scenario.cross_sections import FrameStructure
 from aframe_env.validation import InvalidValue, require_instance, require_number, require_vector
 
@@ -112,7 +112,7 @@ class Winch:
     """The drum and its drive: an actuator with limits on speed, acceleration and paid-out length."""
 
     drum_diameter: float = 1.5
-    """d_H, m."""
+    """d_H, m: that of the rope's centre line in the innermost layer."""
     max_rope_speed: float = 3.0
     """Speed limit, m/s of rope."""
     max_rope_acceleration: float = 2.0
@@ -123,6 +123,14 @@ class Winch:
     """Upper hoist limit switch: least unstretched length paid out between drum and load, m."""
     max_rope_length: float = 3000.0
     """Rope on the drum: greatest unstretched length between drum and load, m."""
+    max_power: float = 0.0
+    """Power at the drum, W: the speed falls as the tension grows; 0 for no limit."""
+    max_torque: float = 0.0
+    """Torque at the drum, N m: beyond it the load turns the drum; 0 for no limit."""
+    inertia: float = 0.0
+    """Of drum and drive about the drum's axis, kg m²; goes with ``max_torque``."""
+    drum_width: float = 0.0
+    """Width that the rope is wound on in layers, m; 0: one layer, however long the rope is."""
 
     def __post_init__(self) -> None:
         require_number("drum_diameter", self.drum_diameter, "m", low=1e-3, high=1e3)
@@ -131,6 +139,14 @@ class Winch:
         require_number("lag", self.lag, "s", low=0.0, high=1e4)
         require_number("min_rope_length", self.min_rope_length, "m", low=1e-3, high=1e5)
         require_number("max_rope_length", self.max_rope_length, "m", low=self.min_rope_length, high=1e5, low_open=True)
+        require_number("max_power", self.max_power, "W", low=1.0, high=1e10, or_zero=True)
+        require_number("max_torque", self.max_torque, "N m", low=1.0, high=1e10, or_zero=True)
+        require_number("inertia", self.inertia, "kg m²", low=1e-3, high=1e9, or_zero=True)
+        require_number("drum_width", self.drum_width, "m", low=1e-3, high=100.0, or_zero=True)
+        if bool(self.max_torque) != bool(self.inertia):
+            raise InvalidValue(
+                f"max_torque = {self.max_torque!r} N m, inertia = {self.inertia!r} kg m²: must both be 0, or neither"
+            )
 
     @property
     def drum_radius(self) -> float:
@@ -149,6 +165,33 @@ class Winch:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Compensator:
+    """Passive heave compensator between drum and pulley: a cylinder with a gas behind it that pays rope out.
+
+    T = F (l / (l - s))^n + c ds/dt, with s the rope that it has given; at the ends of its stroke it stands.
+    """
+
+    stroke: float = 6.0
+    """m of rope, half of it to either side of the middle, where it starts."""
+    gas_length: float = 120.0
+    """l, volume of the gas at mid-stroke over the piston's area, in m of rope. The load's period on it is
+    2 π √(l / (n g)), whatever its mass: 19 s."""
+    exponent: float = 1.3
+    """n, from 1 (isothermal) to 1.4 (adiabatic)."""
+    damping: float = 5.0e4
+    """c, N s/m."""
+    preload: float = 0.0
+    """F, N; 0: what load and rope weigh at the start."""
+
+    def __post_init__(self) -> None:
+        require_number("stroke", self.stroke, "m", low=1e-3, high=100.0)
+        require_number("gas_length", self.gas_length, "m", low=0.5 * self.stroke + 0.5, high=1e4)
+        require_number("exponent", self.exponent, "", low=1.0, high=1.67)
+        require_number("damping", self.damping, "N s/m", low=1e3, high=1e9)
+        require_number("preload", self.preload, "N", low=1.0, high=1e9, or_zero=True)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Crane:
     """A-frame crane: frame, rope, winch and the drum's place on the deck."""
 
@@ -157,12 +200,26 @@ class Crane:
     winch: Winch = field(default_factory=Winch)
     drum_position: Vector = (-2.0, 0.0, 1.0)
     """Drum H in {D}, m."""
+    sheave_friction: float = 0.0
+    """Share by which the tension on the drum's side of the pulley is above that on the load's while rope is hauled in,
+    and below while it is paid out; 0.02 to 0.05 for a sheave on rolling or plain bearings."""
+    compensator: Compensator | None = None
+    """Passive compensator, or None."""
 
     def __post_init__(self) -> None:
         require_instance("frame", self.frame, Frame)
         require_instance("rope", self.rope, Rope)
         require_instance("winch", self.winch, Winch)
         require_vector("drum_position", self.drum_position, "m", low=-1e4, high=1e4)
+        require_number("sheave_friction", self.sheave_friction, "", low=0.0, high=0.2)
+        if self.compensator is not None:
+            require_instance("compensator", self.compensator, Compensator)
+        diameter = self.rope.outer_diameter
+        if self.winch.drum_width and not 0.0 < diameter <= self.winch.drum_width:
+            raise InvalidValue(
+                f"outer_diameter = {diameter!r} m: must be in (0, {self.winch.drum_width:g}] m, the drum_width, for "
+                "the rope to be wound in layers"
+            )
         if self.drum_to_pulley < 1e-3:
             raise InvalidValue(f"drum_position = {self.drum_position} m: must not be the pulley's place, within 1 mm")
 
@@ -176,6 +233,29 @@ class Crane:
     def drum_to_pulley(self) -> float:
         """|SH| with the frame rigid, m."""
         return math.dist(self.pulley_position, self.drum_position)
+
+    @property
+    def layer(self) -> tuple[float, float]:
+        """Height of a layer of rope on the drum, whose turns lie in the grooves of those below, m, and its turns.
+
+        Height 0 where the winch winds no layers.
+        """
+        diameter = self.rope.outer_diameter
+        if not self.winch.drum_width:
+            return 0.0, 1.0
+        return 0.5 * math.sqrt(3.0) * diameter, float(int(self.winch.drum_width / diameter + 1e-9))
+
+    def drum_radius(self, length: float) -> float:
+        """Radius [m] at which the rope runs off the drum with ``length`` m of it between drum and load."""
+        if not self.winch.drum_width:
+            return self.winch.drum_radius
+        return radius_of_layer(length, *self.layer, self.winch.drum_radius, self.winch.max_rope_length)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the winch has the paper's limits alone, and drum and pulley nothing but rope between them."""
+        winch = self.winch
+        return not (winch.max_power or winch.max_torque or winch.drum_width or self.sheave_friction or self.compensator)
 
     def free_length(self, rope_length: float, weight: float) -> float:
         """Unstretched rope [m] between drum and a load of ``weight`` N that hangs ``rope_length`` m below the pulley.

@@ -10,6 +10,7 @@ from typing import Any, Final, Literal
 from aframe_env.dynamics.start import heavy_lengths, longest_chain_step, springs_of_rope
 from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.scenario.motion import HarmonicMotion, ShipMotion, has_components, is_tabled
+from aframe_env.scenario.target import TargetPath
 from aframe_env.scenario.water import LoadShape, Water
 from aframe_env.validation import InvalidValue, require_choice, require_instance, require_number, shown
 
@@ -49,6 +50,8 @@ class Scenario:
     """Water that rope and load are in; None for air, as in the paper."""
     load: LoadShape = field(default_factory=LoadShape)
     """What the water feels of the load."""
+    target_path: TargetPath | None = None
+    """Path of the target from ``target_level`` on; None: it holds."""
 
     def __post_init__(self) -> None:
         require_instance("crane", self.crane, Crane)
@@ -61,13 +64,13 @@ class Scenario:
         require_number("ramp", self.ramp, "s", low=LEAST_RAMP, high=1e4, or_zero=True)
         require_number("gravity", self.gravity, "m/s²", low=1e-3, high=100.0)
         require_instance("load", self.load, LoadShape)
+        if self.water is not None:
+            require_instance("water", self.water, Water)
+        if self.target_path is not None:
+            require_instance("target_path", self.target_path, TargetPath)
+        self._require_room()
         self._require_wet()
         least, most = self.crane.winch.min_rope_length, self.crane.winch.max_rope_length
-        pulley = self.crane.pulley_position[2]
-        if self.target_level >= pulley:
-            raise InvalidValue(
-                f"target_level = {self.target_level!r} m: must be below the pulley, in (-inf, {pulley:g}) m"
-            )
         breaking_load = self.crane.rope.breaking_load
         if self.hanging_weight >= breaking_load > self.weight:
             raise InvalidValue(
@@ -84,6 +87,7 @@ class Scenario:
                 f"target_level = {self.target_level!r} m needs {self.free_length:g} m of unstretched rope between "
                 f"drum and load: must be in ({least:g}, {most:g}) m, the winch's limits"
             )
+        self._require_way()
         if self.rope_frequency > FASTEST_BOBBING:
             lightest = self.rope_stiffness / FASTEST_BOBBING**2
             raise InvalidValue(
@@ -97,6 +101,53 @@ class Scenario:
             )
         self._require_chain()
 
+    @property
+    def target_levels(self) -> tuple[float, float]:
+        """Lowest and highest level of the target, m."""
+        low, high = (0.0, 0.0) if self.target_path is None else self.target_path.changes
+        return self.target_level + low, self.target_level + high
+
+    @property
+    def bed_level(self) -> float:
+        """Level of the seabed, m; -inf without one."""
+        water = self.water
+        return -math.inf if water is None or water.seabed is None else water.surface_level - water.seabed.depth
+
+    def _require_room(self) -> None:
+        """Raise where the target is not between pulley and seabed."""
+        name = "target_level" if self.target_path is None else "target_level with its path"
+        low, high = self.target_levels
+        pulley, ground = self.crane.pulley_position[2], self.bed_level + 0.5 * self.load.height
+        if high >= pulley:
+            raise InvalidValue(f"{name} = {high!r} m: must be below the pulley, in (-inf, {pulley:g}) m")
+        if low < ground:
+            raise InvalidValue(
+                f"{name} = {low!r} m: must be in [{ground:g}, {pulley:g}) m, between the seabed, with half the height "
+                "of the load on it, and the pulley"
+            )
+
+    def _require_way(self) -> None:
+        """Raise where rope or winch do not reach the ends of the target's path."""
+        if self.target_path is None:
+            return
+        winch, breaking_load = self.crane.winch, self.crane.rope.breaking_load
+        for level in self.target_levels:
+            length = self.crane.pulley_position[2] - level
+            parts = heavy_lengths(
+                length, self.crane.drum_to_pulley, self.weight, self.crane.rope.axial_stiffness, self.rope_weight
+            )
+            if not winch.min_rope_length < sum(parts) < winch.max_rope_length:
+                raise InvalidValue(
+                    f"target_path takes the load to {level:g} m, with {sum(parts):g} m of unstretched rope: must be in "
+                    f"({winch.min_rope_length:g}, {winch.max_rope_length:g}) m, the winch's limits"
+                )
+            if self.weight + self.rope_weight * parts[0] >= breaking_load:
+                raise InvalidValue(
+                    f"target_path takes the load to {level:g} m, where rope and load weigh "
+                    f"{self.weight + self.rope_weight * parts[0]:g} N: must be below {breaking_load:g} N, at which the "
+                    "rope parts"
+                )
+
     def _require_wet(self) -> None:
         """Raise where water, rope and load do not go together."""
         rope = self.crane.rope
@@ -104,7 +155,6 @@ class Scenario:
             if self.load != LoadShape():
                 raise InvalidValue(f"load = {shown(self.load)}: goes with water, and there is none")
             return
-        require_instance("water", self.water, Water)
         if self.rope_weight < 0.0:
             raise InvalidValue(
                 f"solid_diameter = {rope.solid_diameter!r} m: the rope floats in water of {self.water.density:g} "
@@ -118,6 +168,12 @@ class Scenario:
 
     def _require_chain(self) -> None:
         """Raise where the waves in the rope are too fast for the inner step."""
+        if self.attached_step < SHORTEST_CHAIN_STEP:
+            raise InvalidValue(
+                f"a passive compensator or seabed as stiff or as little or much damped as this needs steps of "
+                f"{self.attached_step:.2g} s with a load of {self.load_mass:g} kg: must be at least "
+                f"{SHORTEST_CHAIN_STEP:g} s"
+            )
         if self.chain_step < SHORTEST_CHAIN_STEP:
             raise InvalidValue(
                 f"mass_per_length = {self.crane.rope.mass_per_length!r} kg/m: the waves in the rope need steps of "
@@ -140,8 +196,15 @@ class Scenario:
 
     @property
     def weight(self) -> float:
-        """Weight of the load, less its buoyancy, N."""
-        return (self.load_mass - self.density * self.load.volume) * self.gravity
+        """Weight of the load, less its buoyancy at its target, N."""
+        return (self.load_mass - self.density * self.load.volume * self.share_under_water) * self.gravity
+
+    @property
+    def share_under_water(self) -> float:
+        """Share of the load that is under water at its target in calm water; 1 for a load without height."""
+        if self.water is None:
+            return 0.0
+        return self.load.share_under_water(self.water.surface_level - self.target_level)
 
     @property
     def density(self) -> float:
@@ -160,15 +223,21 @@ class Scenario:
 
     @property
     def is_light(self) -> bool:
-        """Whether the rope has no mass and hangs in air, as the paper's."""
-        return self.water is None and not self.crane.rope.mass_per_length
+        """Whether nothing goes beyond the paper: rope without mass, in air, plain winch, a target that holds."""
+        return (
+            self.water is None
+            and not self.crane.rope.mass_per_length
+            and self.crane.is_plain
+            and self.target_path is None
+        )
 
     def require_light(self, what: str) -> None:
-        """Raise where the rope has mass or hangs in water: ``what`` takes the paper's rope alone."""
+        """Raise where something goes beyond the paper: ``what`` takes its rope, winch and target alone."""
         if not self.is_light:
             raise InvalidValue(
-                f"mass_per_length = {self.crane.rope.mass_per_length!r} kg/m, water = {shown(self.water)}: {what} take "
-                "a rope without mass in air: must be 0 kg/m, and None"
+                f"mass_per_length = {self.crane.rope.mass_per_length!r} kg/m, water = {shown(self.water)}, target_path "
+                f"= {shown(self.target_path)}: {what} take a rope without mass in air, a winch without further limits, "
+                "and a target that holds: must be 0 kg/m, None and None"
             )
 
     @cached_property
@@ -200,6 +269,23 @@ class Scenario:
         return longest_chain_step(
             0.9 * self.lengths[0] / lumps, rope.mass_per_length, rope.axial_stiffness, mass, self.loss_time
         )
+
+    @property
+    def attached_step(self) -> float:
+        """Longest stable inner step for seabed and passive compensator, s; inf without them."""
+        step, mass = math.inf, self.load_mass
+        if self.water is not None and self.water.seabed is not None:
+            bed = self.water.seabed
+            step = min(step, 0.5 * math.sqrt(mass / bed.stiffness))
+            if bed.damping:
+                step = min(step, mass / bed.damping)
+        if self.crane.compensator is not None:
+            below, drum_part = self.lengths
+            top = drum_part + (0.45 * below / (self.springs - 1) if self.springs > 1 else 0.9 * below)
+            stiffness = self.crane.rope.axial_stiffness / top
+            rate = stiffness / (self.crane.compensator.damping + stiffness * self.loss_time)
+            step = min(step, 2.0 / rate)
+        return step
 
     @property
     def loss_time(self) -> float:

@@ -196,6 +196,20 @@ class SeaMotion:
         )
         return Components(waves.frequency, response)
 
+    def waves_under(self, x: float, y: float, gravity: float) -> tuple[ComplexArray, FloatArray]:
+        """Complex elevation [m] of each wave (K,) under a point of the deck [m], the ship at rest, and its way (K, 2).
+
+        The way is a unit vector on the deck's axes. In deep water; phases as at time 0.
+        """
+        waves, vessel = self.sea.waves(), self.vessel
+        # The deck's axes are the ship's turned by half a circle.
+        forward = vessel.deck_position[0] - x - vessel.reference_point[0]
+        to_port = vessel.deck_position[1] - y - vessel.reference_point[1]
+        along, across = np.cos(waves.direction), np.sin(waves.direction)
+        number = waves.frequency**2 / gravity
+        phase = waves.phase - number * (forward * along + to_port * across)
+        return waves.amplitude * np.exp(1j * phase), np.stack([-along, -across], axis=1)
+
 
 def _shape_grid() -> FloatArray:
     return np.linspace(0.2, 8.0, 7801)

@@ -20,11 +20,14 @@ import numpy.typing as npt
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.blocks import put_three, three
 from aframe_env.dynamics.compiling import kernel, scalar
-from aframe_env.dynamics.heavy_rope import COST, begin_water, lift_step, put_end
+from aframe_env.dynamics.heavy_rope import lift_step
 from aframe_env.dynamics.layout import Span
+from aframe_env.dynamics.lift import COST, END_TARGET, put_end
 from aframe_env.dynamics.load import Load, RopeEnd, load_constants, rk4_step
 from aframe_env.dynamics.start import hang_rope, inner_steps
+from aframe_env.dynamics.target import target_at
 from aframe_env.dynamics.vector import Vector
+from aframe_env.dynamics.water import begin_water
 from aframe_env.engine import Engine
 from aframe_env.scenario import Scenario
 from aframe_env.scenario.motion import require_coverage
@@ -73,7 +76,7 @@ def coarse_step(scenario: Scenario) -> float:
 
     A rope with mass may ask for a shorter one.
     """
-    return min(COARSE_STEP, COARSE_PHASE / scenario.rope_frequency, scenario.chain_step)
+    return min(COARSE_STEP, COARSE_PHASE / scenario.rope_frequency, scenario.chain_step, scenario.attached_step)
 
 
 class _Drum(NamedTuple):
@@ -136,16 +139,17 @@ def _kernel() -> Callable[..., tuple[float, float, float]]:
 
 @cache
 def _heavy_kernel() -> Callable[..., tuple[float, float, float]]:
-    """As ``_kernel``, for a row whose rope has mass or whose load is in water, and which hangs as it starts."""
+    """As ``_kernel``, for a row that goes beyond the paper, and which hangs as it starts."""
     span = Span(1, 0, 1)
 
     @kernel
     def evaluate(path, angle, speed, row, h, errors):  # type: ignore[no-untyped-def]
-        target, drum = row[at.TARGET], _drum(row)  # type: ignore[no-untyped-call]
+        drum = _drum(row)  # type: ignore[no-untyped-call]
         springs = int(row[at.SPRINGS])
         row[at.STEP_LENGTH] = h
+        interval = row[at.NODE_SEGMENTS] * row[at.CONTROL_PERIOD]
         omega1 = 0.0
-        lowest = highest = errors[0] = row[at.LOAD_POSITION + 2] - target
+        lowest = highest = errors[0] = row[at.LOAD_POSITION + 2] - row[at.LEVEL]
         for i in range((path.shape[0] - 1) // 2):
             for part in range(3):
                 k = 2 * i + part
@@ -155,10 +159,15 @@ def _heavy_kernel() -> Callable[..., tuple[float, float, float]]:
                 if part == 0:
                     put_three(row, at.PULLEY, 1, 0, end.position)
                     put_three(row, at.PULLEY + 3, 1, 0, end.velocity)
+                level, _ = target_at(row, (i + 0.5 * part) * h, 1, 0)
+                row[at.ENDS + part * at.END_SIZE + END_TARGET] = level
+            # The row stays at the node of its start: the waves are taken from there.
+            row[at.ELAPSED] = interval + i * h
             begin_water(row, span)
+            row[at.MOMENT] = 0.5 * h
             lift_step(row, springs, False, span)
             omega1 += h * (1.0 / 6.0) * row[at.STAGE + COST]
-            error = row[at.LOAD_POSITION + 2] - target
+            error = row[at.LOAD_POSITION + 2] - level
             errors[i + 1] = error
             lowest = min(lowest, error)
             highest = max(highest, error)
@@ -208,6 +217,17 @@ def _control_steps(duration: float, control_period: float) -> int:
     return steps
 
 
+def _require_plain_drum(scenario: Scenario) -> None:
+    """Raise where the drum does not simply go where a drive has it."""
+    winch = scenario.crane.winch
+    for name, unit in (("max_power", "W"), ("max_torque", "N m"), ("drum_width", "m")):
+        if getattr(winch, name):
+            raise InvalidValue(
+                f"{name} = {getattr(winch, name)!r} {unit}: drives are for a drum of one layer that turns as it is "
+                f"told: must be 0 {unit}"
+            )
+
+
 class Objective:
     """A scenario laid out for fast evaluation: the pulley's path at every half inner step, computed once.
 
@@ -226,7 +246,8 @@ class Objective:
         require_number("duration", duration, "s", low=0.0, high=3600.0, low_open=True)
         require_number("max_step", max_step, "s", low=2e-3, high=0.2)
         require_coverage(scenario.motion, "duration", duration)
-        max_step = min(max_step, scenario.chain_step)
+        _require_plain_drum(scenario)
+        max_step = min(max_step, scenario.chain_step, scenario.attached_step)
         self.scenario = scenario
         self.duration = float(duration)
         self.control_period = control_period
@@ -249,10 +270,10 @@ class Objective:
         for i in range(1, len(self.times)):
             engine.step(still)
             self.path[i] = row[at.PULLEY : at.PULLEY + 9]
-        self._row = engine.copy_row(0)
-        """The engine's row of the scenario, load, rope and pulley as at the start."""
-        for slot, size in ((at.LIFT, at.LIFT_SIZE), (at.PULLEY, 9), (at.PARTED, 1)):
-            self._row[slot : slot + size] = at_start[slot : slot + size]
+        self._row = at_start
+        """The engine's row of the scenario at the start, with what a step knows of load and rope."""
+        for slot in (at.INVERSE_MASS, at.STIFFNESS):
+            self._row[slot] = row[slot]
         crane = scenario.crane
         # A drum that starts at φ has paid out r φ of rope, which the load stretches, before the start.
         self._lowering = crane.winch.drum_radius * (1.0 + scenario.hanging_weight / crane.rope.axial_stiffness)

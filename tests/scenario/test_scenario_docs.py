@@ -14,6 +14,7 @@ import pytest
 
 from aframe_env import (
     Channel,
+    Compensator,
     Crane,
     Frame,
     Harmonic,
@@ -23,7 +24,9 @@ from aframe_env import (
     Scenario,
     ScenarioDistribution,
     Sea,
+    Seabed,
     Sensors,
+    TargetPath,
     Vessel,
     Water,
     Winch,
@@ -50,10 +53,13 @@ TABLES = {
     FrameStructure: "### `[crane.frame.structure]`",
     Material: "`[crane.frame.structure.material]`:",
     Servomotor: "`[crane.frame.structure.servomotor]`:",
+    TargetPath: "## `[target_path]`",
     Water: "## `[water]`",
+    Seabed: "`[water.seabed]`:",
+    Compensator: "`[crane.compensator]`:",
     LoadShape: "`[load]`:",
 }
-ELSEWHERE = {"crane", "motion", "water", "load"}
+ELSEWHERE = {"crane", "motion", "water", "load", "target_path"}
 """Keys of a scenario that have sections of their own."""
 
 
