@@ -2,6 +2,7 @@ from .config import TaskConfig
 from .scenario.crane import Compensator, Crane, Frame, Rope, Winch
 from .scenario.distribution import ScenarioDistribution
 from .scenario.file import read_scenario, read_scenarios, scenario_text
+from .scenario.loads import LOADS, ReadyLoad
 from .scenario.motion import Harmonic, HarmonicMotion
 from .scenario.recorded_motion import RecordedMotion, RecordedWindow
 from .scenario.scenario import Scenario
@@ -23,6 +24,7 @@ __version__: str
 
 __all__ = [
     "ENV_ID",
+    "LOADS",
     "Channel",
     "Compensator",
     "Crane",
@@ -31,6 +33,7 @@ __all__ = [
     "HarmonicMotion",
     "InvalidValue",
     "LoadShape",
+    "ReadyLoad",
     "RecordNoiseWarning",
     "RecordedMotion",
     "RecordedWindow",

@@ -66,8 +66,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     | 8 | x''_S3 | vertical acceleration of the pulley | m/s² | ±100 |
     | 9 | φ_H | drum angle, from the start | rad | ±1e5 |
     | 10 | φ'_H | actual drum speed | rad/s | ±1e3 |
-    | 11 | T | rope tension | N | 0 ... 1e8 |
-    | 12 | m_L | mass of the load | kg | 0 ... 1e7 |
+    | 11 | T | rope tension, on the drum's side of the pulley | N | 0 ... 1e8 |
+    | 12 | m_L | mass of the load, in air | kg | 0 ... 1e7 |
     | 13 | l | unstretched rope length between drum and load | m | 0 ... 1e5 |
 
     `observation="sensors"`, or a `Sensors` of your own, `Box(10,) float32`: what instruments read, with noise, delay,
@@ -80,9 +80,9 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     | 2, 3 | roll and pitch of the ship, likewise | rad | ±π |
     | 4 | drum angle, by its encoder | rad | ±1e5 |
     | 5 | drum speed | rad/s | ±1e3 |
-    | 6 | rope tension, by a load pin | N | ±1e8 |
-    | 7 | depth error of the load, slow and coarse | m | ±1e3 |
-    | 8 | mass of the load | kg | 0 ... 1e7 |
+    | 6 | rope tension on the drum's side of the pulley, by a load pin | N | ±1e8 |
+    | 7 | depth error of the load, by a transponder or from the rope: slow and coarse | m | ±1e3 |
+    | 8 | mass of the load, in air | kg | 0 ... 1e7 |
     | 9 | unstretched rope length at the start | m | 0 ... 1e5 |
 
     ## Reward
@@ -100,7 +100,10 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
 
     ## Information
     Arrays, of shape () where no other is named: `time` [s], `load_position` (3,) [m], `rope_tension` [N], `slack` (the
-    rope was slack within the last step), `omega1` [m² s] and `omega2` [m] so far, eqs. (31), (32).
+    rope was slack within the last step), `omega1` [m² s] and `omega2` [m] so far, eqs. (31), (32). `rope_tension` is
+    that on the drum's side of the pulley, `load_tension` [N] that at the load. `target_level` [m] is h at the time. On
+    a seabed, `landings` and `lift_offs` are counted so far, `landing_speed` [m/s] is the greatest of all landings, and
+    `contact_force` [N] the greatest within the last step.
 
     With `model="rfem"` also, vectors along the deck's axes: `pulley_deflection` (3,) [m] of S on the frame;
     `foot_reactions` (2, 3) [N], forces on the frame at A_R and A_L; `servomotor_tensions` (2,) [N] of S_R and S_L;

@@ -86,7 +86,8 @@ SENSED: Final = (
 
 # Columns of the results: what a step reports beside the observation, in double precision.
 TIME, LOAD, TENSION, SLACK, OMEGA1, OMEGA2, COST, PARTED = 0, 1, 4, 5, 6, 7, 8, 9
-RESULTS: Final = 10
+LOAD_TENSION, TARGET, CONTACT, LANDINGS, LIFT_OFFS, LANDING_SPEED = 10, 11, 12, 13, 14, 15
+RESULTS: Final = 16
 
 
 def box(quantities: tuple[Quantity, ...]) -> spaces.Box:
@@ -180,6 +181,14 @@ def read_out(row: Any, lanes: int, j: int, state: Any, results: Any, i: int) -> 
     results[i, OMEGA2] = row[at.OMEGA2 * lanes + j]
     results[i, COST] = row[at.STEP_COST * lanes + j]
     results[i, PARTED] = row[at.PARTED * lanes + j]
+    # A rope without mass pulls at its load as at the pulley.
+    plain = row[at.SPRINGS * lanes + j] == 0.0
+    results[i, LOAD_TENSION] = row[at.TENSION * lanes + j] if plain else row[at.LOAD_TENSION * lanes + j]
+    results[i, TARGET] = row[at.TARGET * lanes + j]
+    results[i, CONTACT] = row[at.CONTACT * lanes + j]
+    results[i, LANDINGS] = row[at.LANDINGS * lanes + j]
+    results[i, LIFT_OFFS] = row[at.LIFT_OFFS * lanes + j]
+    results[i, LANDING_SPEED] = row[at.LANDING_SPEED * lanes + j]
 
 
 @cache
@@ -223,6 +232,12 @@ def info(results: FloatArray, frames: FloatArray | None) -> dict[str, npt.NDArra
         "slack": results[:, SLACK] > 0.0,
         "omega1": results[:, OMEGA1],
         "omega2": results[:, OMEGA2],
+        "load_tension": results[:, LOAD_TENSION],
+        "target_level": results[:, TARGET],
+        "contact_force": results[:, CONTACT],
+        "landings": results[:, LANDINGS].astype(np.int64),
+        "lift_offs": results[:, LIFT_OFFS].astype(np.int64),
+        "landing_speed": results[:, LANDING_SPEED],
     }
     if frames is not None:
         found |= {

@@ -253,6 +253,12 @@ def test_information_is_arrays() -> None:
         "slack": ((), "bool"),
         "omega1": ((), "float64"),
         "omega2": ((), "float64"),
+        "load_tension": ((), "float64"),
+        "target_level": ((), "float64"),
+        "contact_force": ((), "float64"),
+        "landings": ((), "int64"),
+        "lift_offs": ((), "int64"),
+        "landing_speed": ((), "float64"),
     }
     before = info["time"].item()
     env.step(np.zeros(1, dtype=np.float32))

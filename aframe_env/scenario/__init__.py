@@ -2,6 +2,7 @@
 
 from aframe_env.scenario.crane import GRAVITY, Compensator, Crane, Frame, Rope, Winch
 from aframe_env.scenario.distribution import NUMBERS, Range, ScenarioDistribution, ScenarioSource
+from aframe_env.scenario.loads import LOADS, ReadyLoad
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion, ShipMotion
 from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
 from aframe_env.scenario.scenario import Initial, Scenario
@@ -13,6 +14,7 @@ from aframe_env.scenario.water import LoadShape, Seabed, Water
 
 __all__ = [
     "GRAVITY",
+    "LOADS",
     "NUMBERS",
     "Channel",
     "Compensator",
@@ -23,6 +25,7 @@ __all__ = [
     "Initial",
     "LoadShape",
     "Range",
+    "ReadyLoad",
     "RecordedMotion",
     "RecordedWindow",
     "Rope",

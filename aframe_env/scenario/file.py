@@ -43,12 +43,14 @@ from aframe_env.scenario.cross_sections import (
     Tube,
 )
 from aframe_env.scenario.distribution import Range, ScenarioDistribution, ScenarioSource
+from aframe_env.scenario.loads import ready_load
 from aframe_env.scenario.motion import HarmonicMotion, ShipMotion
 from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
 from aframe_env.scenario.scenario import Scenario
 from aframe_env.scenario.sea import Sea, SeaMotion
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.scenario.vessel import Vessel
+from aframe_env.scenario.water import LoadShape
 from aframe_env.serialization import plain, strict_converter, structure
 from aframe_env.text import read_toml
 from aframe_env.validation import InvalidValue, require_choice, shown
@@ -181,6 +183,12 @@ def _converter(folder: Path) -> Converter:
     def peak_enhancement(value: Any, _: Any) -> Range | str:
         return value if isinstance(value, str) else interval(value, None)
 
+    shape = converter.get_structure_hook(LoadShape)
+
+    def load(value: Any, kind: Any) -> LoadShape:
+        return ready_load(value).shape if isinstance(value, str) else shape(value, kind)
+
+    converter.register_structure_hook(LoadShape, load)
     converter.register_structure_hook(StressPoint, stress_point)
     converter.register_structure_hook_func(lambda kind: kind == MemberSection, member)
     converter.register_structure_hook_func(lambda kind: kind == Section, section)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,9 @@ from aframe_env.memory import require_memory
 from aframe_env.validation import InvalidValue, require_instance, require_number, shown
 
 FloatArray = npt.NDArray[np.float64]
+
+SPEED_OF_SOUND: Final = 1500.0
+"""In sea water, m/s."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +35,8 @@ class Channel:
     """Time between samples, held in between, s; 0 for a sample at every control step."""
     resolution: float = 0.0
     """Smallest step of the reading; 0 for none."""
+    delay: float = 0.0
+    """Time from a motion to its reading beside that of all channels, s."""
 
     def __post_init__(self) -> None:
         for name in ("noise", "relative_noise"):
@@ -39,6 +44,7 @@ class Channel:
         require_number("resolution", self.resolution, "of the channel's unit", low=1e-12, high=1e9, or_zero=True)
         require_number("correlation_time", self.correlation_time, "s", low=0.0, high=1e6)
         require_number("period", self.period, "s", low=0.0, high=1e4)
+        require_number("delay", self.delay, "s", low=0.0, high=10.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +84,18 @@ class Sensors:
             require_instance(name, getattr(self, name), Channel)
 
     @classmethod
+    def transponder(cls, depth: float, **changes: Any) -> Sensors:
+        """Return the default sensors with the load's depth told through ``depth`` m of water.
+
+        A pressure gauge on the load answers an acoustic call: sound takes a second for 1,500 m, there and back, and the
+        next call follows the answer by a second. ``changes`` replace further fields.
+        """
+        require_number("depth", depth, "m", low=0.0, high=1.2e4)
+        way = depth / SPEED_OF_SOUND
+        channel = Channel(noise=0.05, period=2.0 * way + 1.0, resolution=0.01, delay=way)
+        return cls(**{"depth_error": channel, **changes})
+
+    @classmethod
     def ideal(cls) -> Sensors:
         """Return the same channels without noise, delay, sampling or resolution."""
         perfect: dict[str, Any] = {name: Channel() for name in CHANNELS}
@@ -100,12 +118,15 @@ class SensorBank:
         self._hold = np.array([max(1, round(c.period / control_period)) for c in channels], dtype=np.int64)
         self._resolution = np.array([c.resolution for c in channels])
         # A reading is the truth `delay` ago, interpolated between the control steps on either side.
-        whole = math.floor(sensors.delay / control_period + 1e-9)
-        self._weight = min(1.0, max(0.0, sensors.delay / control_period - whole))
+        delays = np.array([sensors.delay + c.delay for c in channels]) / control_period
+        self._whole = np.floor(delays + 1e-9).astype(np.int64)
+        self._weight = np.clip(delays - self._whole, 0.0, 1.0)
+        past = int(self._whole.max()) + 2
         require_memory(
-            f"num_envs = {rows} with sensors that are {sensors.delay:g} s late", 8 * rows * (whole + 2) * len(CHANNELS)
+            f"num_envs = {rows} with sensors that are {delays.max() * control_period:g} s late",
+            8 * rows * past * len(CHANNELS),
         )
-        self._memory = np.zeros((rows, whole + 2, len(CHANNELS)))
+        self._memory = np.zeros((rows, past, len(CHANNELS)))
         """(rows, past control steps with the newest first, channels)."""
         self._error = np.zeros((rows, len(CHANNELS)))
         self._reading = np.zeros((rows, len(CHANNELS)))
@@ -150,6 +171,7 @@ class SensorBank:
     def _measure(self, rows: slice) -> None:
         _read_kernel()(
             self._memory[rows],
+            self._whole,
             self._weight,
             self._noise,
             self._relative,
@@ -167,8 +189,8 @@ class SensorBank:
 def _read_kernel():  # type: ignore[no-untyped-def]
 
     @kernel
-    def read(memory, weight, noise, relative, keep, hold, resolution, seed, count, error, reading):  # type: ignore[no-untyped-def]
-        rows, past, channels = memory.shape
+    def read(memory, whole, weight, noise, relative, keep, hold, resolution, seed, count, error, reading):  # type: ignore[no-untyped-def]
+        rows, _, channels = memory.shape
         for i in range(rows):
             for c in range(channels):
                 draw = normal(seed[i], count[i] * channels + c)
@@ -178,7 +200,8 @@ def _read_kernel():  # type: ignore[no-untyped-def]
                 else:
                     error[i, c] = keep[c] * error[i, c] + fresh * draw
                 if count[i] % hold[c] == 0:
-                    truth = (1.0 - weight) * memory[i, past - 2, c] + weight * memory[i, past - 1, c]
+                    newer, older = memory[i, whole[c], c], memory[i, whole[c] + 1, c]
+                    truth = (1.0 - weight[c]) * newer + weight[c] * older
                     value = truth + error[i, c] * max(noise[c], relative[c] * abs(truth))
                     if resolution[c] > 0.0:
                         value = round(value / resolution[c]) * resolution[c]

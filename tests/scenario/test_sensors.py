@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aframe_env import Channel, Scenario, ScenarioDistribution, Sensors
+from aframe_env import Channel, InvalidValue, Scenario, ScenarioDistribution, Sensors
 from aframe_env.scenario.sensors import CHANNELS, SensorBank
 
 PERIOD = 0.1
@@ -158,3 +158,21 @@ def test_seed_makes_the_readings() -> None:
     np.testing.assert_array_equal(one, again)
     assert np.isfinite(one).all()
     assert (one[1:, :2] != other[1:, :2]).all()
+
+
+def test_channel_may_be_later_than_the_others() -> None:
+    sensors = replace(Sensors.ideal(), delay=0.25, depth_error=Channel(delay=0.8))
+    truth = np.random.default_rng(2).normal(size=(40, len(CHANNELS)))
+    found = readings(sensors, truth, seed=1)
+    # 2.5 and 10.5 control steps ago.
+    np.testing.assert_allclose(found[12:, 0], 0.5 * (truth[10:-2, 0] + truth[9:-3, 0]), rtol=0, atol=1e-12)
+    depth = CHANNELS.index("depth_error")
+    np.testing.assert_allclose(found[12:, depth], 0.5 * (truth[2:-10, depth] + truth[1:-11, depth]), rtol=0, atol=1e-12)
+
+
+def test_transponder_takes_the_sounds_time() -> None:
+    channel = Sensors.transponder(3000.0).depth_error
+    assert (channel.delay, channel.period) == (2.0, 5.0)
+    assert Sensors.transponder(0.0, delay=0.2).delay == 0.2
+    with pytest.raises(InvalidValue, match="depth = -3"):
+        Sensors.transponder(-3.0)
