@@ -49,6 +49,7 @@ from aframe_env.scenario.scenario import Scenario
 from aframe_env.scenario.sea import Sea, SeaMotion
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.scenario.vessel import Vessel
+from aframe_env.scenario.water import LoadShape, Water
 from aframe_env.serialization import plain, strict_converter, structure
 from aframe_env.text import read_toml
 from aframe_env.validation import InvalidValue, require_choice, shown
@@ -257,6 +258,12 @@ class _Distribution:
     sensors: Sensors = field(default_factory=Sensors)
     records: tuple[str, ...] = ()
     window: float = ScenarioDistribution.window
+    water: Water | None = None
+    load: LoadShape = field(default_factory=LoadShape)
+    added_mass_factor: Range = ScenarioDistribution.added_mass_factor
+    drag_factor: Range = ScenarioDistribution.drag_factor
+    current_factor: Range = ScenarioDistribution.current_factor
+    current_turn: Range = ScenarioDistribution.current_turn
 
 
 def _distribution(table: _Distribution, folder: Path, source: str) -> ScenarioDistribution:
