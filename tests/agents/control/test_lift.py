@@ -17,16 +17,21 @@ from aframe_env import (
     Sea,
     SeaMotion,
     Sensors,
+    TaskConfig,
     Vessel,
     Water,
 )
 from aframe_env.scenario.crane import GRAVITY
+from aframe_env.simulation import Simulation
 from aframe_env.task import STATE
 from agents.control.feedback import Feedback
 from agents.control.inverse_dynamics import InverseDynamics, RequiredRope
 from agents.control.lift import unweighed
 from agents.control.predictive import PlanningConfig, PredictiveControl
 from agents.control.regulator import HoistBatch
+from agents.drives.forecast import Harmonics
+from agents.drives.map import DriveMap, ideal_ratio
+from agents.learned.feature_policy import FeaturePolicy
 from agents.policy import DrumStill, Policy
 from agents.rollout import run
 
@@ -108,6 +113,35 @@ def test_laws_hold_loads_on_heavy_ropes(law: Policy, bar: float) -> None:
     held = run(law, DEEP, observation=observation, episode_duration=30.0).rms
     still = run(DrumStill(), DEEP, episode_duration=30.0).rms
     assert (held < bar * still).all(), held / still
+
+
+def test_a_map_of_light_ropes_allows_for_the_strain_at_the_pulley() -> None:
+    """A ratio that is exact for light ropes pays out 1 / (1 + e) of the heave on heavy ones."""
+    axes = [np.array(axis) for axis in ((0.5, 3.0), (5.0, 15.0), (1e4, 3e5), (50.0, 3000.0))]
+    exact = np.broadcast_to(1.0 / (1.0 + axes[2] * GRAVITY / 2e8), (2, 2, 2, 2)).transpose(0, 1, 3, 2)
+    light = DriveMap(*axes, ratio=exact.astype(np.complex128), remaining=np.zeros((2, 2, 2, 2)))
+    heave = Harmonics(np.array([1.5]), np.array([0.7]), np.array([0.0]))
+    for scenario in DEEP:
+        drive = light.drive(scenario, heave, 30.0)
+        assert drive.variables[0] * 0.75 == pytest.approx(1.5 * ideal_ratio(scenario), rel=1e-4)
+        assert ideal_ratio(scenario) == pytest.approx(1.0 / (1.0 + scenario.hanging_weight / 2e8))
+
+
+def test_agents_predict_with_the_water_that_is_set() -> None:
+    """As in the rollout, where the scenario tells it."""
+    policy = FeaturePolicy(lambda features: np.clip(0.1 * features[:, 0], -1.0, 1.0))
+    policy.crane, policy.water, policy.load = HEAVY, DEEP[1].water, SHAPE
+    simulation = Simulation(1, TaskConfig(scenario=DEEP[1]))
+    simulation.reset_rows(np.arange(1), [(DEEP[1], 0)])
+    twin = FeaturePolicy(policy._function)
+    twin.reset([DEEP[1]], PERIOD)
+    memory = None
+    for step in range(20):
+        observation = simulation.observe()
+        predicted, memory = policy.predict(observation, memory)
+        command = twin.act(observation, step * PERIOD)
+        np.testing.assert_array_equal(predicted[:, 0], command.astype(np.float32))
+        simulation.advance(command)
 
 
 def test_light_rows_keep_their_bits_beside_heavy_ones() -> None:
