@@ -30,19 +30,20 @@ def clone(
     data = minari.load_dataset(dataset)
     env = data.recover_environment()
     env.reset(seed=0)
-    config, crane = env.unwrapped.simulation.config, env.unwrapped.scenario.crane
+    config, scenario = env.unwrapped.simulation.config, env.unwrapped.scenario
     episodes = [episode for episode in data.iterate_episodes() if episode.truncations[-1]]  # no parted ropes
     seen = np.stack([episode.observations[:-1] for episode in episodes])
     actions = np.stack([episode.actions[:, 0] for episode in episodes]).astype(np.float64)
     # The expert often asks for more than the winch can reach in a step: what it can reach is as good, and easier.
     time = config.control_period + (config.sensors.delay if config.sensors else 0.0)
-    reach, limit = crane.winch.max_acceleration * time, crane.winch.max_speed
+    winch = scenario.crane.winch
+    reach, limit = winch.max_acceleration * time, winch.max_speed
     speed = seen[:, :, [quantity.name for quantity in config.quantities].index("drum_speed")]
     target = np.clip(actions, speed - reach, speed + reach) / limit
     made_for = FeatureConfig.of(config, "speed")
     if inputs == "features":  # what the agents see: filtered, with a forecast of the waves
         memory = features_for(len(seen), made_for)
-        rows = [memory.start(seen[:, 0], [crane] * len(seen))]
+        rows = [memory.start(seen[:, 0], [scenario] * len(seen))]
         for t in range(1, seen.shape[1]):
             memory.command(actions[:, t - 1] / limit)
             rows.append(memory.advance(seen[:, t]))

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, Literal
 
 import numpy as np
 
-from aframe_env.dynamics.start import critical_damping
+from aframe_env.dynamics.start import LIGHT_ROPE, SHORT_ROPE, critical_damping, heavy_lengths
 from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
 from aframe_env.scenario.scenario import LEAST_MASS, LEAST_RAMP, Scenario
 from aframe_env.scenario.sea import FULL_TURN, Sea, SeaMotion, dnv_gamma
 from aframe_env.scenario.sensors import Sensors
+from aframe_env.scenario.target import TargetPath
 from aframe_env.scenario.vessel import Vessel
+from aframe_env.scenario.water import LoadShape, Water
 from aframe_env.validation import InvalidValue, require_instance, require_integer, require_number, shown
 
 Range = float | tuple[float, float]
@@ -23,6 +25,8 @@ Range = float | tuple[float, float]
 
 SUBSTREAM: Final = 8
 """Numbers that sea, load and rope each take from the generator, however many they need."""
+FASTEST_CURRENT: Final = 5.0
+"""Greatest speed of a drawn current, m/s."""
 NUMBERS: Final = 3 * SUBSTREAM
 """Random numbers that a scenario is drawn with."""
 
@@ -34,15 +38,25 @@ def _require_range(name: str, value: Any, unit: str, low: float, high: float, lo
         for part, item in zip(("low", "high"), value, strict=True):
             require_number(f"{name} ({part})", item, unit, low=low, high=high, low_open=low_open)
         if value[0] > value[1]:
-            raise InvalidValue(f"{name} = {shown(value)} {unit}: the low end is above the high end")
+            raise InvalidValue(f"{name} = {shown(value)} {unit}".rstrip() + ": the low end is above the high end")
     elif isinstance(value, list):
         raise InvalidValue(f"{name} = {shown(value)}: must be a number or a tuple (low, high) in {unit}")
     else:
         require_number(name, value, unit, low=low, high=high, low_open=low_open)
 
 
+def _highest(value: Range) -> float:
+    return value[1] if isinstance(value, tuple) else value
+
+
 def _draw(value: Range, uniform: float) -> float:
     return value[0] + (value[1] - value[0]) * uniform if isinstance(value, tuple) else value
+
+
+def _uniform(value: Range, drawn: float) -> float:
+    """The number in [0, 1] at which ``_draw`` is nearest to what is ``drawn``."""
+    low, high = value if isinstance(value, tuple) else (value, value)
+    return min(max((drawn - low) / (high - low), 0.0), 1.0) if high > low else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,6 +97,22 @@ class ScenarioDistribution:
     """Recorded motions in place of the seas: each episode meets a stretch of one of them, from a random start."""
     window: float = 60.0
     """Length of a stretch of ``records``, s; at least an episode's."""
+    water: Water | None = None
+    """Water that rope and load are in; None for air."""
+    load: LoadShape = field(default_factory=LoadShape)
+    """Shape of a load with the mass in the middle of ``load_mass``. One that is drawn has the same form and density:
+    volume and added masses go with its mass, areas with its power of two thirds, its height with that of one third, and
+    none floats that others do not."""
+    target_path: TargetPath | None = None
+    """Path of the target from where the load hangs at the start; None: it holds."""
+    added_mass_factor: Range = 1.0
+    """What the added masses are multiplied by."""
+    drag_factor: Range = 1.0
+    """What the drag areas are multiplied by."""
+    current_factor: Range = 1.0
+    """What the velocities of the water's current are multiplied by."""
+    current_turn: Range = 0.0
+    """Angle that the current is turned by, from x to y, rad."""
 
     def __post_init__(self) -> None:
         _require_range("hs", self.hs, "m", 0.0, 30.0)
@@ -100,11 +130,54 @@ class ScenarioDistribution:
         require_instance("crane", self.crane, Crane)
         require_instance("sensors", self.sensors, Sensors)
         require_number("window", self.window, "s", low=0.0, high=1e6, low_open=True)
+        require_instance("load", self.load, LoadShape)
+        if self.target_path is not None:
+            require_instance("target_path", self.target_path, TargetPath)
+        self._require_water()
         self._require_records()
         self._require_rope()
         # The corners of the distribution must be scenarios: refuse now rather than in the middle of a run.
         for load, rope in itertools.product((0.0, 1.0), repeat=2):
             self._build(np.full(SUBSTREAM, load), np.full(SUBSTREAM, load), np.full(SUBSTREAM, rope))
+        if self.crane.rope.mass_per_length:
+            self._build(*self._finest_chain())
+
+    def _finest_chain(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Numbers of the scenario whose rope asks for the shortest steps.
+
+        That of the shortest rope which is a chain, with the greatest damping and the heaviest load beside which it is.
+        """
+        rope, load, length = self.crane.rope, np.ones(SUBSTREAM), np.ones(SUBSTREAM)
+        load[0] = _uniform(self.load_mass, (1.0 - 1e-9) * SHORT_ROPE * rope.mass_per_length / LIGHT_ROPE)
+        # In air, where it is stretched more: in water the very shortest is a hair longer.
+        pull = (_draw(self.load_mass, float(load[0])) + 0.5 * rope.mass_per_length * SHORT_ROPE) * GRAVITY
+        length[0] = _uniform(self.rope_length, SHORT_ROPE * (1.0 + pull / rope.axial_stiffness))
+        return load, load, length
+
+    def _require_water(self) -> None:
+        """Raise where water, current and what is drawn of them do not go together."""
+        _require_range("added_mass_factor", self.added_mass_factor, "", 0.0, 100.0)
+        _require_range("drag_factor", self.drag_factor, "", 0.0, 100.0)
+        _require_range("current_factor", self.current_factor, "", 0.0, 100.0)
+        _require_range("current_turn", self.current_turn, "rad", -FULL_TURN, FULL_TURN)
+        if self.water is not None:
+            require_instance("water", self.water, Water)
+        current = () if self.water is None else self.water.current
+        for name in ("added_mass_factor", "drag_factor", "current_factor", "current_turn"):
+            value = getattr(self, name)
+            if value == getattr(ScenarioDistribution, name):
+                continue
+            if self.water is None:
+                raise InvalidValue(f"{name} = {shown(value)}: goes with water, and there is none")
+            if name.startswith("current") and not current:
+                raise InvalidValue(f"{name} = {shown(value)}: goes with a current, and the water has none")
+        speed = max((math.hypot(x, y) for _, x, y in current), default=0.0) * _highest(self.current_factor)
+        drawn = self.current_factor != 1.0 or self.current_turn != 0.0
+        if drawn and speed > FASTEST_CURRENT:
+            raise InvalidValue(
+                f"current_factor = {shown(self.current_factor)}: the current would run at {speed:g} m/s: must be at "
+                f"most {FASTEST_CURRENT:g} m/s"
+            )
 
     def _require_records(self) -> None:
         """Raise where a record is none, or shorter than the stretch that is drawn from it, or a sea is given beside."""
@@ -131,12 +204,26 @@ class ScenarioDistribution:
         least, most = self.crane.winch.min_rope_length, self.crane.winch.max_rope_length
         for length in self.rope_length if isinstance(self.rope_length, tuple) else (self.rope_length,):
             for mass in self.load_mass if isinstance(self.load_mass, tuple) else (self.load_mass,):
-                paid_out = self.crane.free_length(length, mass * GRAVITY)
+                paid_out = self._paid_out(length, mass)
                 if not least < paid_out < most:
                     raise InvalidValue(
                         f"rope_length = {self.rope_length!r} m: {length:g} m needs {paid_out:g} m of unstretched rope "
                         f"between drum and load: must be in ({least:g}, {most:g}) m, the winch's limits"
                     )
+
+    def _paid_out(self, rope_length: float, load_mass: float) -> float:
+        """Unstretched rope between drum and a load at rest, m; of a heavy rope, as if it were long."""
+        crane, weight = self.crane, load_mass * GRAVITY
+        if self._is_light:
+            return crane.free_length(rope_length, weight)
+        density = 0.0 if self.water is None else self.water.density
+        weight -= density * self._shape(load_mass, 1.0, 1.0).volume * GRAVITY
+        rope_weight = crane.rope.weight_per_length(GRAVITY, density) if crane.rope.mass_per_length else 0.0
+        return sum(heavy_lengths(rope_length, crane.drum_to_pulley, weight, crane.rope.axial_stiffness, rope_weight))
+
+    @property
+    def _is_light(self) -> bool:
+        return self.water is None and not self.crane.rope.mass_per_length
 
     def draw(self, rng: np.random.Generator) -> Scenario:
         """Draw one scenario."""
@@ -156,16 +243,52 @@ class ScenarioDistribution:
     def _build(self, u_sea: np.ndarray, u_load: np.ndarray, u_rope: np.ndarray) -> Scenario:
         m, r = u_load.tolist(), u_rope.tolist()
         load_mass, rope_length = _draw(self.load_mass, m[0]), _draw(self.rope_length, r[0])
+        ratio = _draw(self.rope_damping_ratio, r[1])
         weight = load_mass * GRAVITY
         stiffness = self.crane.rope.axial_stiffness / self.crane.free_length(rope_length, weight)
-        return Scenario(
+        scenario = Scenario(
             crane=self.crane,
             motion=self._window(u_sea) if self.records else self._sea_motion(u_sea),
             load_mass=load_mass,
             target_level=self.crane.pulley_position[2] - rope_length,
-            rope_damping=_draw(self.rope_damping_ratio, r[1]) * critical_damping(stiffness, load_mass),
+            rope_damping=ratio * critical_damping(stiffness, load_mass) if self._is_light else 0.0,
             ramp=self.ramp,
+            target_path=self.target_path,
+            water=self._water(u_sea),
+            load=self._shape(load_mass, _draw(self.added_mass_factor, m[1]), _draw(self.drag_factor, m[2])),
         )
+        if self._is_light:
+            return scenario
+        damping = ratio * critical_damping(scenario.rope_stiffness, scenario.moved_mass)
+        return replace(scenario, rope_damping=damping) if damping else scenario
+
+    def _shape(self, load_mass: float, added_mass_factor: float, drag_factor: float) -> LoadShape:
+        """Shape of a load of this mass."""
+        if self.load == LoadShape():
+            return self.load
+        size = load_mass / _draw(self.load_mass, 0.5)
+        added, area = size * added_mass_factor, size ** (2.0 / 3.0) * drag_factor
+        return LoadShape(
+            volume=size * self.load.volume,
+            added_mass_vertical=added * self.load.added_mass_vertical,
+            added_mass_horizontal=added * self.load.added_mass_horizontal,
+            drag_area_vertical=area * self.load.drag_area_vertical,
+            drag_area_horizontal=area * self.load.drag_area_horizontal,
+            height=size ** (1.0 / 3.0) * self.load.height,
+            slam_area=size ** (2.0 / 3.0) * self.load.slam_area,
+            exit_area=size ** (2.0 / 3.0) * self.load.exit_area,
+        )
+
+    def _water(self, u_sea: np.ndarray) -> Water | None:
+        """The water with the current that is drawn."""
+        if self.water is None or not self.water.current:
+            return self.water
+        factor, turn = _draw(self.current_factor, float(u_sea[5])), _draw(self.current_turn, float(u_sea[6]))
+        if factor == 1.0 and turn == 0.0:
+            return self.water
+        c, s = factor * math.cos(turn), factor * math.sin(turn)
+        current = tuple((depth, c * x - s * y, s * x + c * y) for depth, x, y in self.water.current)
+        return replace(self.water, current=current)
 
     def _window(self, u_sea: np.ndarray) -> RecordedWindow:
         """Draw a stretch of a record: every start in every record is as likely as any other."""

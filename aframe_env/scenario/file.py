@@ -49,8 +49,9 @@ from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
 from aframe_env.scenario.scenario import Scenario
 from aframe_env.scenario.sea import Sea, SeaMotion
 from aframe_env.scenario.sensors import Sensors
+from aframe_env.scenario.target import TargetPath
 from aframe_env.scenario.vessel import Vessel
-from aframe_env.scenario.water import LoadShape
+from aframe_env.scenario.water import LoadShape, Water
 from aframe_env.serialization import plain, strict_converter, structure
 from aframe_env.text import read_toml
 from aframe_env.validation import InvalidValue, require_choice, shown
@@ -265,6 +266,13 @@ class _Distribution:
     sensors: Sensors = field(default_factory=Sensors)
     records: tuple[str, ...] = ()
     window: float = ScenarioDistribution.window
+    water: Water | None = None
+    load: LoadShape = field(default_factory=LoadShape)
+    added_mass_factor: Range = ScenarioDistribution.added_mass_factor
+    drag_factor: Range = ScenarioDistribution.drag_factor
+    current_factor: Range = ScenarioDistribution.current_factor
+    current_turn: Range = ScenarioDistribution.current_turn
+    target_path: TargetPath | None = None
 
 
 def _distribution(table: _Distribution, folder: Path, source: str) -> ScenarioDistribution:

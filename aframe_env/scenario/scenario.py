@@ -222,6 +222,11 @@ class Scenario:
         return self.weight + self.rope_weight * self.lengths[0]
 
     @property
+    def pulley_strain(self) -> float:
+        """Strain at rest of the rope at the pulley: what the drum pays out is longer by that."""
+        return self.hanging_weight / self.crane.rope.axial_stiffness
+
+    @property
     def is_light(self) -> bool:
         """Whether nothing goes beyond the paper: rope without mass, in air, plain winch, a target that holds."""
         return (

@@ -50,7 +50,7 @@ class Feedback:
             self.name, self.knows = "feed-forward + feedback", Knowledge.SENSORS
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
-        """Begin N episodes; of the scenarios only the crane is looked at."""
+        """Begin N episodes; of the scenarios only what a ``Lift`` has is looked at."""
         self._scenarios, self._period, self._hoists = scenarios, control_period, None
 
     def act(self, observation: Observation, time: float) -> FloatArray:
@@ -59,7 +59,7 @@ class Feedback:
             quantities, tuned = (STATE, STATE_GAINS) if self.sensors is None else (SENSED, SENSOR_GAINS)
             gains = self.gains or tuned
             hoists = self._hoists = HoistBatch(len(observation), self._period, quantities)
-            o = hoists.start([s.crane for s in self._scenarios], observation)
+            o = hoists.start(self._scenarios, observation)
             self._regulator = hoists.regulator(gains)
             self._observer = observer_for(hoists, gains.damping_ratio, self.sensors, self.waves)
             self._observer.start(o)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -24,13 +24,19 @@ class RequiredRope:
     The pulley's path is the simulation's own. A load held at its level swings below the pulley S as a pendulum whose
     rope bears its weight: x'' = g (S_x - x) / (S_z - h), y likewise. The rope bears m g / cos θ, and is as much
     longer than its unstretched length as that stretches it.
+
+    A heavy rope at rest in space stays at rest while what is paid out, longer by the strain at the pulley, makes up for
+    the pulley's way: nothing in it moves. Its load swings as with the drum still: added mass, drag, current and the
+    rope's weight are the simulation's own.
     """
 
     def __init__(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         self._half = 0.5 * control_period
-        self._engine = Engine(len(scenarios), self._half, max_inner_step=0.2)
+        self._heavy = np.array([not s.is_light for s in scenarios])
+        # Of light ropes only the pulley is looked at: their loads may bob as they like.
+        self._engine = Engine(len(scenarios), self._half, max_inner_step=None if self._heavy.any() else 0.2)
         for i, scenario in enumerate(scenarios):
-            self._engine.reset_row(i, scenario)
+            self._engine.reset_row(i, _unbreakable(scenario))
         self._still = np.zeros(len(scenarios))
         self._level = np.array([s.target_level for s in scenarios])
         self._weight = np.array([s.weight for s in scenarios])
@@ -38,6 +44,9 @@ class RequiredRope:
         self._axial_stiffness = np.array([s.crane.rope.axial_stiffness for s in scenarios])
         self._to_pulley = np.array([s.crane.drum_to_pulley for s in scenarios])
         self._free_length = np.array([s.free_length for s in scenarios])
+        self._rope_length = np.array([s.rope_length for s in scenarios])
+        self._stretch = np.array([s.rope_length - s.lengths[0] for s in scenarios])
+        self._strain = np.array([s.pulley_strain for s in scenarios])
         self._place = self._engine.read_many(at.LOAD_POSITION, 2)
         self._velocity = self._engine.read_many(at.LOAD_VELOCITY, 2)
 
@@ -47,7 +56,10 @@ class RequiredRope:
         height = pulley[:, 2] - self._level
         length = np.sqrt(((pulley[:, :2] - self._place) ** 2).sum(axis=1) + height**2)
         stretched = 1.0 + self._weight * length / height / self._axial_stiffness
-        return np.asarray((length + self._to_pulley) / stretched - self._free_length)
+        light = (length + self._to_pulley) / stretched - self._free_length
+        # Aslant the rope bears more, and is stretched by as much more.
+        further = length - self._rope_length - self._stretch * (length / height - 1.0)
+        return np.asarray(np.where(self._heavy, further / (1.0 + self._strain), light))
 
     def advance(self) -> None:
         """Go on by half a control step."""
@@ -56,11 +68,20 @@ class RequiredRope:
         self._place += self._half * self._velocity
         self._engine.step(self._still)
         self._velocity += 0.5 * self._half * self._pull()
+        self._place[self._heavy] = self._engine.read_many(at.LOAD_POSITION, 2)[self._heavy]
 
     def _pull(self) -> FloatArray:
         pulley = self._engine.read_many(at.PULLEY, 3)
         rate = self._gravity / (pulley[:, 2] - self._level)
         return np.asarray(rate[:, None] * (pulley[:, :2] - self._place))
+
+
+def _unbreakable(scenario: Scenario) -> Scenario:
+    """The scenario with a heavy rope that does not part, however its load may bob while the drum stands still."""
+    if scenario.is_light:
+        return scenario
+    rope = replace(scenario.crane.rope, breaking_load=1e12)
+    return replace(scenario, crane=replace(scenario.crane, rope=rope))
 
 
 @dataclass
@@ -80,6 +101,8 @@ class InverseDynamics:
     _rope: RequiredRope = field(init=False, repr=False)
     _required: FloatArray = field(init=False, repr=False)
     """(3, N) rope to be paid out half a control step ago, now, and in half a control step, m."""
+    _lengthened: FloatArray = field(init=False, repr=False)
+    """(N,) length below the pulley of a metre that the drum pays out, 1 for light ropes, which say it in ``_rope``."""
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes."""
@@ -90,11 +113,13 @@ class InverseDynamics:
         """Drum speed commands (N,) rad/s for observations (N, 14) of the full state."""
         if self._hoists is None:
             self._hoists = HoistBatch(len(observation), self._period, STATE)
-            self._hoists.start([s.crane for s in self._scenarios], observation)
+            self._hoists.start(self._scenarios, observation)
+            radius = np.array([s.crane.winch.drum_radius for s in self._scenarios])
+            self._lengthened = self._hoists.winch.radius / radius
             self._regulator = self._hoists.regulator(self.gains)
-            now = self._rope.now()
+            now = self._wanted()
             self._rope.advance()
-            later = self._rope.now()
+            later = self._wanted()
             self._required = np.stack([2.0 * now - later, now, later])
         hoists, winch, period = self._hoists, self._hoists.winch, self._period
         o = hoists.columns(observation)
@@ -104,8 +129,12 @@ class InverseDynamics:
         rope_end_speed = (later - before) / period - winch.radius * o["drum_speed"]
         z = np.stack([o["depth_error"], o["load_velocity_z"], rope_end, rope_end_speed], axis=1)
         self._rope.advance()
-        end = self._rope.now()
+        end = self._wanted()
         command, _ = winch.command((end - now - period * self._regulator.speed(z)) / winch.radius)
         self._rope.advance()
-        self._required = np.stack([later, end, self._rope.now()])
+        self._required = np.stack([later, end, self._wanted()])
         return command
+
+    def _wanted(self) -> FloatArray:
+        """Rope to be paid out since the start, as long as it is below the pulley, (N,) m."""
+        return self._lengthened * self._rope.now()

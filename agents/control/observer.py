@@ -83,7 +83,7 @@ class KalmanObserver:
 
     def _start(self, o: Columns, rows: Rows) -> None:
         hoists, tension = self._hoists, self._tension
-        noise = np.maximum(tension.noise, tension.relative_noise * hoists.mass[rows] * GRAVITY)
+        noise = np.maximum(tension.noise, tension.relative_noise * hoists.weighed[rows] * GRAVITY)
         model = hoists.model(self._damping_ratio, rows)
         self._rope.start(model, hoists.period, hoists.stretch_under(noise, o, rows), rows)
         self.waves.start(rows)
@@ -144,6 +144,11 @@ class StateObserver:
         winch.speed[rows] = o["drum_speed"]
         self._velocity[rows], self._acceleration[rows] = o["pulley_velocity_z"], o["pulley_acceleration_z"]
         rope_end = o["depth_error"] + self._hoists.stretch(o, rows)
+        if self._hoists.heavy[rows].any():
+            # The waves in a heavy rope are in its tension; where its end is, is known from pulley, drum and slant.
+            aslant = 0.5 * (o["load_offset_x"] ** 2 + o["load_offset_y"] ** 2) / o["rope_length"]
+            reckoned = o["pulley_heave"] - winch.radius[rows] * o["drum_angle"] + aslant
+            rope_end = np.where(self._hoists.heavy[rows], reckoned, rope_end)
         rope_end_speed = o["pulley_velocity_z"] - winch.radius[rows] * o["drum_speed"]
         self._z[rows] = np.stack([o["depth_error"], o["load_velocity_z"], rope_end, rope_end_speed], axis=1)
 

@@ -245,7 +245,7 @@ def _gauss_newton(
 def _rope_model(scenario: Scenario, period: float) -> FloatArray:
     """(2, 4, 4): transition of depth error, its rate, rope's end and pay-out speed over a step, and over half of it."""
     frequency = scenario.rope_frequency
-    damping = scenario.rope_damping / critical_damping(scenario.rope_stiffness, scenario.load_mass) * frequency
+    damping = scenario.total_rope_damping / critical_damping(scenario.rope_stiffness, scenario.moved_mass) * frequency
     rate = np.zeros((4, 4))
     rate[0, 1] = 1.0
     rate[1] = -(frequency**2), -2.0 * damping, frequency**2, -2.0 * damping

@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aframe_env.scenario import Scenario, ScenarioDistribution
-from aframe_env.scenario.crane import Crane
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import require_integer, require_number
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import ALL, Rows
 from agents.control.interior_point import BoundedTracking
+from agents.control.lift import Lift
 from agents.control.observer import observer_for
 from agents.control.regulator import Columns, HoistBatch, Observation
 from agents.policy import FloatArray, Knowledge
@@ -98,16 +98,17 @@ class Planner:
         self.period = control_period
         self.hoists = HoistBatch(rows, control_period, STATE if config.sensors is None else SENSED)
         self._observer = observer_for(self.hoists, config.damping_ratio, config.sensors, config.waves)
-        self._turned = np.zeros(rows)
+        self._turned, self._efforts = np.zeros(rows), np.ones(rows)
         self._k, self._cost_to_go = np.zeros((rows, 4)), np.zeros((rows, 4, 4))
 
-    def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Columns:
+    def start(self, observation: Observation, lifts: Sequence[Lift], rows: Rows = ALL) -> Columns:
         """Begin hoists in these rows with first observations (n, K); return these by their names."""
-        o = self.hoists.start(cranes, observation, rows)
+        o = self.hoists.start(lifts, observation, rows)
         self._observer.start(o, rows)
-        model, price = self.hoists.model(self._config.damping_ratio, rows), self._config.price
-        self._cost_to_go[rows] = cost_to_go = model.costs_to_go(price)
-        self._k[rows] = model.gains_for(cost_to_go, price)
+        model = self.hoists.model(self._config.damping_ratio, rows)
+        self._efforts[rows] = efforts = self.hoists.efforts(self._config.price, rows)
+        self._cost_to_go[rows] = cost_to_go = model.costs_to_go(efforts)
+        self._k[rows] = model.gains_for(cost_to_go, efforts)
         return o
 
     def advance(self, observation: Observation) -> Columns:
@@ -143,7 +144,9 @@ class Planner:
         change = regulated
         if len(beyond):
             change = regulated.copy()
-            change[beyond] = self.problem(z, pulley, drum_speed, beyond).solve()[0]
+            for effort in np.unique(self._efforts[beyond]):
+                alike = beyond[self._efforts[beyond] == effort]
+                change[alike] = self.problem(z, pulley, drum_speed, alike).solve()[0]
             some, state = model.some(beyond), z[beyond]
             for k in range(pulley.shape[1]):
                 state = some.advance(state, change[beyond, k])
@@ -160,7 +163,10 @@ class Planner:
         )
 
     def problem(self, z: FloatArray, pulley: FloatArray, drum_speed: FloatArray, rows: Rows = ALL) -> BoundedTracking:
-        """The problem of these rows, in changes (n, H) m/s of the rope end's speed; arguments of all rows."""
+        """The problem of these rows, in changes (n, H) m/s of the rope end's speed; arguments of all rows.
+
+        They must be rows of one effort.
+        """
         inputs, speed = self._nominal(z, pulley, drum_speed)
         model, winch = self._observer.model.some(rows), self.hoists.winch
         count, horizon = speed[rows].shape
@@ -175,7 +181,7 @@ class Planner:
             middle_input=np.zeros((count, horizon)),
             error=np.ascontiguousarray(free[:, :, 0].T),
             error_middle=np.zeros((count, horizon)),
-            weights=(1.0, 0.0, self._config.price),
+            weights=(1.0, 0.0, float(self._efforts[rows][0])),
             inputs=inputs[rows],
             state=speed[rows],
             input_limit=self._gain(horizon)[rows],
@@ -212,20 +218,19 @@ class PredictiveControl:
         sensed = self.config.sensors is not None
         self.name = "predictive control" if sensed else "predictive control (state)"
         self.knows = Knowledge.SENSORS if sensed else Knowledge.STATE
-        self._cranes: Sequence[Crane] = ()
+        self._lifts: Sequence[Lift] = ()
         self._period = 0.1
         self._planner: Planner | None = None
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
-        """Begin N episodes; of the scenarios only the crane is looked at."""
-        self._cranes = [scenario.crane for scenario in scenarios]
-        self._period, self._planner = control_period, None
+        """Begin N episodes; of the scenarios only what a ``Lift`` has is looked at."""
+        self._lifts, self._period, self._planner = scenarios, control_period, None
 
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for readings (N, 10), or observations (N, 14) of the full state."""
         if self._planner is None:
             self._planner = Planner(len(observation), self._period, self.config)
-            self._planner.start(observation, self._cranes)
+            self._planner.start(observation, self._lifts)
         else:
             self._planner.advance(observation)
         return self._planner.command(self._planner.plan().rope_speed)

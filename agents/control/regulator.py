@@ -9,16 +9,18 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.scenario.crane import GRAVITY, Crane
+from aframe_env.scenario.crane import GRAVITY
 from aframe_env.task import Quantity
 from aframe_env.validation import InvalidValue, require_number
 from agents.control.filters import ALL, FloatArray, Rows
+from agents.control.lift import LEAST_WEIGHT, Lift, unweighed
 from agents.control.rope import RopeModel
 from agents.control.winch import WinchModel
 
+QUICKEST: Final = 0.4
+"""Quickest poles of a law, as a share of the first frequency of a rope's own waves, π c / L: the laws know the bobbing
+alone, and one that is nearer drives the waves on."""
 Observation = npt.NDArray[np.float32]
-LEAST_WEIGHT: Final = 1.0
-"""Least weight of a load, N: a reading of nothing stands for that."""
 Columns = dict[str, FloatArray]
 """An observation by the names of its quantities, each (N,)."""
 
@@ -67,28 +69,46 @@ class Regulator:
 
 
 class HoistBatch:
-    """Winches, loads and ropes of N rows, as far as a policy may know them from crane and observation."""
+    """Winches, loads and ropes of N rows, as far as a policy may know them from the lift's data and the observation.
+
+    With a heavy rope or in water ``winch.radius`` is that of the drum times 1 + the strain at the pulley: the rope that
+    a drum pays out is longer by that.
+    """
 
     def __init__(self, rows: int, control_period: float, quantities: tuple[Quantity, ...]) -> None:
         """``quantities`` of the observations."""
         self.period = control_period
         self.winch = WinchModel(rows, control_period)
         self._columns = {q.name: i for i, q in enumerate(quantities)}
-        self._axial_stiffness, self._weight, self.mass, self.frequency = np.ones((4, rows))
-        """``mass`` of the loads, (N,) kg, as they were weighed; ``frequency`` of their bobbing on the ropes, rad/s."""
+        self._axial_stiffness, self._weight, self.weighed, self.mass, self.frequency = np.ones((5, rows))
+        """``weighed`` (N,) kg: mass that would weigh in air as much as hangs on the pulley; ``mass`` (N,) kg that bobs
+        on the ropes, the same with a light rope in air; ``frequency`` of the bobbing, rad/s."""
+        self._least_effort = np.zeros(rows)
+        self.heavy = np.zeros(rows, dtype=np.bool_)
+        """(N,) rows whose rope has mass, or is in water."""
 
-    def start(self, cranes: Sequence[Crane], observation: Observation, rows: Rows = ALL) -> Columns:
-        """Begin hoists with these cranes in these rows; return the first observation (n, K) by its names.
+    def start(self, lifts: Sequence[Lift], observation: Observation, rows: Rows = ALL) -> Columns:
+        """Begin hoists of these lifts in these rows; return the first observation (n, K) by its names.
 
         The loads are weighed: a lift begins with the load hanging still on its rope, and what the tension reads then is
-        its weight, whatever mass was told.
+        its weight and that of the rope, whatever mass was told.
         """
-        self.winch.start(cranes, rows)
+        self.winch.start([lift.crane for lift in lifts], rows)
         o = self.columns(observation)
-        self._axial_stiffness[rows] = [crane.rope.axial_stiffness for crane in cranes]
+        self._axial_stiffness[rows] = [lift.crane.rope.axial_stiffness for lift in lifts]
         self._weight[rows] = np.maximum(o["rope_tension"], LEAST_WEIGHT)
-        self.mass[rows] = self._weight[rows] / GRAVITY
+        self.weighed[rows] = self._weight[rows] / GRAVITY
+        fixed, by_length, drum_part, softness, slowness = np.array([unweighed(lift) for lift in lifts]).T
+        below = o["rope_length"] - drum_part
+        # A pin that reads less than the rope alone weighs must not make a mass of less than nothing.
+        moved = self.weighed[rows] + (fixed + by_length * below)
+        self.mass[rows] = np.maximum(moved, LEAST_WEIGHT / GRAVITY)
+        self.winch.radius[rows] *= 1.0 + softness * self._weight[rows]
         self.frequency[rows] = np.sqrt(self._axial_stiffness[rows] / (o["rope_length"] * self.mass[rows]))
+        # A regulator of this effort has its poles at (ω² / √effort / period)^¼.
+        slower = (slowness * below / (QUICKEST * np.pi)) ** 4
+        self._least_effort[rows] = np.square(self.frequency[rows] ** 2 * slower / self.period)
+        self.heavy[rows] = softness > 0.0
         return o
 
     def columns(self, observation: Observation) -> Columns:
@@ -107,11 +127,15 @@ class HoistBatch:
     def regulator(self, gains: Gains) -> Regulator:
         """Feedback law for the loads and ropes."""
         acceleration = gains.share * self.winch.radius * self.winch.max_acceleration
-        k = self.model(gains.damping_ratio).gains(gains.effort)
+        k = self.model(gains.damping_ratio).gains(self.efforts(gains.effort))
         return Regulator(k, acceleration / self.frequency**2, acceleration)
 
+    def efforts(self, tuned: float, rows: Rows = ALL) -> FloatArray:
+        """Efforts (n,) s² of a law: the one that was ``tuned``, or what keeps it out of the rope's own waves."""
+        return np.maximum(tuned, self._least_effort[rows])
+
     def stretch(self, o: Columns, rows: Rows = ALL) -> FloatArray:
-        """Stretch (N,) m of the rope beyond that under the load's weight, as the tension tells."""
+        """Stretch (N,) m of the rope beyond that at rest, as the tension tells."""
         return self.stretch_under(o["rope_tension"] - self._weight[rows], o, rows)
 
     def stretch_under(self, force: FloatArray, o: Columns, rows: Rows = ALL) -> FloatArray:

@@ -50,22 +50,22 @@ class RopeModel:
         """State (N, 4) a control step after ``z`` (N, 4), p having changed by ``change`` (N,) m/s."""
         return np.asarray((self.a @ z[:, :, None])[:, :, 0] + self.b * change[:, None])
 
-    def costs_to_go(self, effort: float) -> FloatArray:
-        """P (N, 4, 4) of the cost to go zᵀ P z: least Σ e² + ``effort`` c² over an infinite horizon; effort in s²."""
+    def costs_to_go(self, effort: FloatArray) -> FloatArray:
+        """P (N, 4, 4) of the cost to go zᵀ P z: least Σ e² + effort c² over an infinite horizon; efforts (N,) in s²."""
         weight = np.diag([1.0, 0.0, 0.0, 0.0])
         return np.stack(
             [
-                solve_discrete_are(a, b[:, None], weight, np.array([[effort]]))
-                for a, b in zip(self.a, self.b, strict=True)
+                solve_discrete_are(a, b[:, None], weight, np.array([[each]]))
+                for a, b, each in zip(self.a, self.b, effort, strict=True)
             ]
         )
 
-    def gains(self, effort: float) -> FloatArray:
-        """K (N, 4) of the feedback c = -K z with the least Σ e² + ``effort`` c² (linear-quadratic regulator)."""
+    def gains(self, effort: FloatArray) -> FloatArray:
+        """K (N, 4) of the feedback c = -K z with the least Σ e² + effort c² (linear-quadratic regulator)."""
         return self.gains_for(self.costs_to_go(effort), effort)
 
-    def gains_for(self, cost_to_go: FloatArray, effort: float) -> FloatArray:
-        """The same, from the ``costs_to_go`` (N, 4, 4) of that effort."""
+    def gains_for(self, cost_to_go: FloatArray, effort: FloatArray) -> FloatArray:
+        """The same, from the ``costs_to_go`` (N, 4, 4) of these efforts."""
         pb = (cost_to_go @ self.b[:, :, None])[:, :, 0]
         k = (pb[:, None, :] @ self.a)[:, 0, :]
         return np.asarray(k / (effort + (pb * self.b).sum(axis=1))[:, None])

@@ -45,7 +45,7 @@ def required_angle(objective: Objective) -> FloatArray:
     crane = scenario.crane
     load = np.array([*crane.pulley_position[:2], scenario.target_level])
     distance = np.linalg.norm(objective.path[:, :3] - load, axis=1)
-    length = (distance + crane.drum_to_pulley) / (1.0 + scenario.hanging_weight / crane.rope.axial_stiffness)
+    length = (distance + crane.drum_to_pulley) / (1.0 + scenario.pulley_strain)
     return np.asarray((length - length[0]) / crane.winch.drum_radius)
 
 

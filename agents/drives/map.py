@@ -22,7 +22,7 @@ from safetensors.numpy import load as load_arrays
 from safetensors.numpy import save as save_arrays
 from scipy.interpolate import RegularGridInterpolator
 
-from aframe_env.scenario import Crane, Scenario
+from aframe_env.scenario import GRAVITY, Crane, Scenario
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion
 from aframe_env.serialization import strict_converter, structure
 from aframe_env.validation import InvalidValue, require_number
@@ -68,7 +68,7 @@ class Node:
             target_level=self.crane.pulley_position[2] - self.length,
             initial="rest",
         )
-        return replace(case, rope_damping=self.damping_ratio * 2.0 * case.load_mass * case.rope_frequency)
+        return replace(case, rope_damping=self.damping_ratio * 2.0 * case.moved_mass * case.rope_frequency)
 
 
 @dataclass(frozen=True)
@@ -168,10 +168,18 @@ class DriveMap:
         real, imaginary = np.moveaxis(self._interpolator(points), -1, 0)
         return np.asarray(real + 1j * imaginary)
 
+    def light_strain(self, mass: float, axial_stiffness: float) -> float:
+        """Strain, of a rope of ``axial_stiffness`` N, that ``ratio_at`` allows for with this mass [kg].
+
+        Rope paid out is longer by it; a heavy rope in water, whose load bobs like that mass, has another one.
+        """
+        return min(max(mass, float(self.mass[0])), float(self.mass[-1])) * GRAVITY / axial_stiffness
+
     def drive(self, scenario: Scenario, heave: Harmonics, duration: float) -> RampedDrive:
         """The drive for a heave of the tip: each harmonic's own, all together, over ``duration`` s.
 
-        Of the scenario it takes load mass, rope length, drum radius, and the ramp of the ship's motion.
+        Of the scenario it takes the mass that bobs on the rope, rope length, drum radius, and the ramp of the ship's
+        motion; with a heavy rope in water also the strain at the pulley.
         """
         require_number("duration", duration, "s", low=0.0, low_open=True)
         count = len(heave.amplitude)
@@ -180,21 +188,24 @@ class DriveMap:
         ratio = self.ratio_at(
             whole,
             2.0 * np.pi / heave.frequency,
-            np.full(count, scenario.load_mass),
+            np.full(count, scenario.moved_mass),
             np.full(count, scenario.rope_length),
         )
+        if not scenario.is_light:
+            light = self.light_strain(scenario.moved_mass, scenario.crane.rope.axial_stiffness)
+            ratio *= (1.0 + light) / (1.0 + scenario.pulley_strain)
         amplitude = np.abs(ratio) * heave.amplitude / scenario.crane.winch.drum_radius
         variables = np.stack([amplitude, heave.frequency, heave.phase + np.angle(ratio)], axis=1)
         return RampedDrive(duration=float(duration), variables=variables.ravel(), ramp=scenario.ramp)
 
 
 def ideal_ratio(scenario: Scenario) -> float:
-    """Rope paid out over heave that keeps the tension at the load's weight: 1/(1 + m g / (E_R F_R)).
+    """Rope paid out over heave that keeps the tension as it is at rest: 1/(1 + m g / (E_R F_R)), or with W + w L.
 
     The closed form for a tip that only heaves. The stretched length follows the tip, the unstretched one is less by
     the strain; the load then feels no motion at all, whatever its period, amplitude, or the rope's length.
     """
-    return 1.0 / (1.0 + scenario.weight / scenario.crane.rope.axial_stiffness)
+    return 1.0 / (1.0 + scenario.pulley_strain)
 
 
 def serialise(drive_map: DriveMap, command: str, versions: dict[str, str]) -> tuple[bytes, str]:

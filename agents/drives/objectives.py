@@ -276,7 +276,7 @@ class Objective:
             self._row[slot] = row[slot]
         crane = scenario.crane
         # A drum that starts at φ has paid out r φ of rope, which the load stretches, before the start.
-        self._lowering = crane.winch.drum_radius * (1.0 + scenario.hanging_weight / crane.rope.axial_stiffness)
+        self._lowering = crane.winch.drum_radius * (1.0 + scenario.pulley_strain)
         self._errors = np.empty(self.steps + 1)
 
     def evaluate(self, angle: FloatArray, speed: FloatArray) -> Outcome:

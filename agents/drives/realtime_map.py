@@ -67,7 +67,7 @@ class RealTimeMapPolicy:
             self.name, self.knows = "drive map in real time", Knowledge.SENSORS
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
-        """Begin N episodes; of the scenarios only the crane is looked at."""
+        """Begin N episodes; of the scenarios only what a ``Lift`` has is looked at."""
         self._scenarios, self._period, self._hoists = scenarios, control_period, None
 
     def act(self, observation: Observation, time: float) -> FloatArray:
@@ -78,7 +78,7 @@ class RealTimeMapPolicy:
         period = self._period
         if self._hoists is None:
             self._hoists = HoistBatch(len(observation), period, STATE if self.sensors is None else SENSED)
-            o = self._hoists.start([s.crane for s in self._scenarios], observation)
+            o = self._hoists.start(self._scenarios, observation)
             self._start(self._hoists.winch, o)
         else:
             o = self._hoists.columns(observation)
@@ -117,6 +117,11 @@ class RealTimeMapPolicy:
             np.broadcast_to(self._hoists.mass[:, None], phasors.shape),
             np.broadcast_to(o["rope_length"][:, None], phasors.shape),
         )
+        for i, lift in enumerate(self._scenarios):
+            if not lift.is_light:
+                # The radius counts the strain at the pulley already; what the map counts as such comes off.
+                axial_stiffness = lift.crane.rope.axial_stiffness
+                self._ratio[i] *= 1.0 + self.drive_map.light_strain(self._hoists.mass[i], axial_stiffness)
 
 
 class _Drums:

@@ -12,8 +12,10 @@ import numpy.typing as npt
 
 from aframe_env.scenario import Scenario
 from aframe_env.scenario.crane import Crane
+from aframe_env.scenario.water import LoadShape, Water
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue, require_numbers
+from agents.control.lift import Lift
 from agents.learned.feature_sets import features_for
 from agents.learned.features import FeatureConfig, Features
 from agents.learned.plan_features import PlanFeatures
@@ -29,32 +31,35 @@ class OnFeatures(ABC):
     knows: Knowledge
     crane: Crane
     """The crane whose winch and rope ``predict`` reckons with; the reference crane, unless you set another."""
+    water: Water | None
+    """The water that ``predict`` reckons with; none, unless you set one."""
+    load: LoadShape
+    """The load's shape in that water."""
 
     def __init__(self, name: str, config: FeatureConfig) -> None:
         self.name = name
         self.knows = Knowledge.SENSORS if config.sensors else Knowledge.STATE
-        self.crane = Crane()
+        self.crane, self.water, self.load = Crane(), None, LoadShape()
         self._config = config
         self._features: Features | PlanFeatures | None = None
-        self._cranes: Sequence[Crane] = ()
+        self._lifts: Sequence[Lift] = ()
 
     @abstractmethod
     def _output(self, inputs: Float32Array) -> FloatArray:
         """Outputs (N,), in [-1, 1], for features (N, F)."""
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
-        """Begin N episodes; of the scenarios the policy looks at the crane alone."""
+        """Begin N episodes; of the scenarios the policy looks at what a ``Lift`` has alone."""
         trained = self._config.control_period
         if abs(control_period - trained) > 1e-9:
             raise InvalidValue(f"control_period = {control_period} s: the agent was trained for {trained} s")
-        self._cranes = [scenario.crane for scenario in scenarios]
-        self._features = None
+        self._lifts, self._features = scenarios, None
 
     def act(self, observation: Float32Array, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s; the first call since the last reset begins the features' memory."""
         if self._features is None:
             self._features = features_for(len(observation), self._config)
-            inputs = self._features.start(observation, self._cranes)
+            inputs = self._features.start(observation, self._lifts)
         else:
             inputs = self._features.advance(observation)
         return self._features.command(self._finite_output(inputs))
@@ -83,10 +88,10 @@ class OnFeatures(ABC):
         """
         checked = self._checked(observation)
         rows = np.atleast_2d(checked)
-        count, crane = len(rows), self.crane
+        count = len(rows)
         if state is None:
             memory = features_for(count, self._config)
-            inputs = memory.start(rows, [crane] * count)
+            inputs = memory.start(rows, [self] * count)
         else:
             known = isinstance(state, Features | PlanFeatures)
             if not known or state.rows != count:
@@ -98,7 +103,7 @@ class OnFeatures(ABC):
             inputs = memory.advance(rows)
             begun = np.flatnonzero(_starts(episode_start, count))
             if len(begun):
-                inputs[begun] = memory.start(rows[begun], [crane] * len(begun), begun)
+                inputs[begun] = memory.start(rows[begun], [self] * len(begun), begun)
         actions = memory.command(self._finite_output(inputs)).astype(np.float32)[:, None]
         return (actions[0] if checked.ndim == 1 else actions), memory
 

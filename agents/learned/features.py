@@ -20,12 +20,12 @@ import numpy.typing as npt
 
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import ScenarioDistribution
-from aframe_env.scenario.crane import Crane
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import require_choice
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import ALL, FloatArray, Rows
+from agents.control.lift import Lift
 from agents.control.observer import observer_for
 from agents.control.regulator import Columns, HoistBatch, Observation
 
@@ -103,9 +103,9 @@ class Features:
         self._speed_before = np.zeros(rows)
         """Reckoned speed of the drums at its beginning, rad/s."""
 
-    def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
+    def start(self, observation: Observation, lifts: Sequence[Lift], rows: Rows = ALL) -> Float32Array:
         """Features (n, F) of the first observations (n, K) of these ``rows``, whose past is forgotten."""
-        o = self._hoists.start(cranes, observation, rows)
+        o = self._hoists.start(lifts, observation, rows)
         self._observer.start(o, rows)
         return self._look(o, rows)
 

@@ -14,8 +14,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from aframe_env.scenario.crane import Crane
 from agents.control.filters import ALL, FloatArray, Rows
+from agents.control.lift import Lift
 from agents.control.predictive import Plan, Planner, PlanningConfig
 from agents.control.regulator import Columns, Observation
 from agents.learned.features import LIMIT, FeatureConfig, lift_features, load_features
@@ -73,9 +73,9 @@ class PlanFeatures:
         self._planner = Planner(rows, config.control_period, PlanningConfig(sensors=config.sensors, waves=config.waves))
         self._heave, self._length, self._planned = np.zeros((3, rows))
 
-    def start(self, observation: Observation, cranes: Sequence[Crane], rows: Rows = ALL) -> Float32Array:
+    def start(self, observation: Observation, lifts: Sequence[Lift], rows: Rows = ALL) -> Float32Array:
         """Features (n, F) of the first observations (n, K) of these ``rows``, whose past is forgotten."""
-        self._take(self._planner.start(observation, cranes, rows), rows)
+        self._take(self._planner.start(observation, lifts, rows), rows)
         return self._look()[rows]
 
     def advance(self, observation: Observation) -> Float32Array:

@@ -10,7 +10,7 @@ import torch
 from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.task import STATE
 from aframe_env.validation import InvalidValue
-from agents.control.regulator import LEAST_WEIGHT
+from agents.control.lift import LEAST_WEIGHT
 from agents.control.winch import WinchModel
 from agents.learned.features import LIMIT, FeatureConfig, lift_features, load_features, wanted_turn
 
@@ -19,7 +19,7 @@ _Invert = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
 
 
 class TensorFeatures:
-    """``Features`` of N rows on the full state, that all have one crane."""
+    """``Features`` of N rows on the full state, that all have one crane with a light rope in air."""
 
     def __init__(
         self, rows: int, crane: Crane, config: FeatureConfig, device: torch.device | str, *, cuda: bool

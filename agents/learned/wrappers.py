@@ -217,8 +217,8 @@ def _begin(
     rows: npt.NDArray[np.int64],
 ) -> None:
     """Begin episodes in these ``rows`` of n, whose first observations are (n, K)."""
-    cranes = [scenario.crane for row in rows.tolist() if (scenario := simulation.scenarios[row]) is not None]
-    features.start(observation, simulation.state[rows], cranes, rows)
+    lifts = [scenario for row in rows.tolist() if (scenario := simulation.scenarios[row]) is not None]
+    features.start(observation, simulation.state[rows], lifts, rows)
     cuts.start(rows)
 
 

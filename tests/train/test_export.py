@@ -18,12 +18,12 @@ import pytest
 from rich.console import Console
 
 import agents
-from aframe_env import InvalidValue, ScenarioDistribution
+from aframe_env import InvalidValue, Scenario, ScenarioDistribution
 from aframe_env.scenario.crane import Crane, Rope, Winch
 from agents.learned.agent import LearnedPolicy
 from agents.rollout import held_out_scenarios
 from train.export import __main__ as command
-from train.export.check import check
+from train.export.check import Lifts, check
 from train.export.interface import crane_values, readings_of, told_of
 from train.export.session import Session
 
@@ -237,3 +237,9 @@ def test_the_example_in_c_stops_on_a_row_that_is_broken(
     np.testing.assert_array_equal(printed[:, 1], np.arange(300) >= 199)
     assert (np.diff(abs(printed[199:, 0])) <= 0.0).all()
     assert printed[-1, 0] == 0.0
+
+
+def test_models_are_for_light_ropes(exported: Exported) -> None:
+    heavy = Scenario(crane=Crane(rope=Rope.six_strand()))
+    with pytest.raises(InvalidValue, match="exported controllers take a rope without mass in air"):
+        Lifts(exported.agent, [heavy])

@@ -108,7 +108,7 @@ class Options(RunOptions):
 def paper_case(initial: Initial = "rest", damping_ratio: float = PAPER_DAMPING_RATIO) -> Scenario:
     """Scenario of ``--case paper``, or a variant of it."""
     scenario = Scenario.paper(initial=initial)
-    critical = 2.0 * scenario.load_mass * scenario.rope_frequency
+    critical = 2.0 * scenario.moved_mass * scenario.rope_frequency
     return replace(scenario, rope_damping=damping_ratio * critical)
 
 

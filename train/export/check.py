@@ -51,6 +51,8 @@ class Lifts:
 
     def __init__(self, agent: LearnedPolicy, scenarios: Sequence[Scenario]) -> None:
         card = agent.card
+        for scenario in scenarios:
+            scenario.require_light("exported controllers")
         quantities: tuple[Quantity, ...] = STATE if card.sensors is None else SENSED
         self._places = {quantity.name: place for place, quantity in enumerate(quantities)}
         self._read, self._told = readings_of(card).names, told_of(card).names

@@ -220,7 +220,8 @@ def build(options: Options) -> Learner:
 
 
 def check(options: Options) -> None:
-    """Raise unless there is the device that is asked for."""
+    """Raise unless there is the device that is asked for, and the ropes are such as it takes."""
+    options.config.nominal.require_light("features of tensors")
     if options.device == "cuda":
         open_device("cuda")
 

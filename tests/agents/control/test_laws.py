@@ -50,7 +50,7 @@ def test_the_gains_are_the_best_there_are():
     """No other gains near them cost less over a long time, from any start."""
     model = RopeModel.of(np.array([2.0]), 0.03, PERIOD)
     effort = 0.01
-    k = model.gains(effort)
+    k = model.gains(np.array([effort]))
     cost = solve_discrete_are(model.a[0], model.b[0][:, None], np.diag([1.0, 0.0, 0.0, 0.0]), [[effort]])
 
     def spent(gains, start):

@@ -27,7 +27,7 @@ def law(rows, crane):
     simulation.reset_rows(np.arange(rows), [(scenario, 0) for scenario in scenarios])
     observation = simulation.observe()
     planner = Planner(rows, PERIOD, config)
-    planner.start(observation, [crane] * rows)
+    planner.start(observation, scenarios)
     tension, length = (observation[:, index(name)].astype(float) for name in ("rope_tension", "rope_length"))
     frequency = np.sqrt(crane.rope.axial_stiffness / (length * tension / GRAVITY))
     return planner, RopeModel.of(frequency, config.damping_ratio, PERIOD)
@@ -50,7 +50,7 @@ def situations(rows, seed):
 def dense(model, row, z, pulley, drum_speed):
     """Hessian and gradient of the cost, and limits' matrix and bounds: by the model's powers, step by step."""
     a, b = model.a[row], model.b[row]
-    cost_to_go = model.costs_to_go(EFFORT)[row]
+    cost_to_go = model.costs_to_go(np.full(len(model.b), EFFORT))[row]
     reach = np.zeros((HORIZON + 1, 4, HORIZON))
     free = np.zeros((HORIZON + 1, 4))
     free[0] = z
@@ -80,7 +80,7 @@ def test_without_limits_the_regulator_solves_the_problem():
     planner, model = law(3, Crane(winch=Winch(max_rope_speed=90.0, max_rope_acceleration=900.0)))
     rng = np.random.default_rng(1)
     z, pulley, still = rng.standard_normal((3, 4)) * 0.2, rng.standard_normal((3, HORIZON)), np.zeros(3)
-    k, state = model.gains(EFFORT), z
+    k, state = model.gains(np.full(len(model.b), EFFORT)), z
     changes, _ = planner.problem(z, pulley, still).solve()
     for step in range(HORIZON):
         wanted = -(k * state).sum(axis=1)

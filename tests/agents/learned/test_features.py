@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from aframe_env import Crane, HarmonicMotion, Scenario, ScenarioDistribution
+from aframe_env import HarmonicMotion, Scenario, ScenarioDistribution
 from aframe_env.config import TaskConfig
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.simulation import Simulation
@@ -16,9 +16,9 @@ def ran(observation, rows=12, steps=400, seed=8):
     simulation = Simulation(rows, TaskConfig(observation=observation, control_period=PERIOD))
     drawn = [simulation.draw(rng) for _ in range(rows)]
     simulation.reset_rows(np.arange(rows), drawn)
-    cranes = [scenario.crane for scenario, _ in drawn]
+    lifts = [scenario for scenario, _ in drawn]
     features = Features(rows, FeatureConfig.of(simulation.config))
-    got, true = [features.start(simulation.observe(), cranes)], [simulation.state.copy()]
+    got, true = [features.start(simulation.observe(), lifts)], [simulation.state.copy()]
     output = np.zeros(rows)
     for _ in range(steps):
         output = 0.8 * output + 0.1 * rng.normal(size=rows)
@@ -68,10 +68,10 @@ def test_a_row_that_starts_anew_forgets_its_own_past_alone():
     simulation = Simulation(3, TaskConfig(observation="sensors", scenario=ScenarioDistribution(hs=3.0)))
     rng = np.random.default_rng(1)
     simulation.reset_rows(np.arange(3), [simulation.draw(rng) for _ in range(3)])
-    cranes = [Crane()] * 3
+    lifts = [Scenario()] * 3
     restarted, going_on = (Features(3, FeatureConfig.of(simulation.config)) for _ in range(2))
     for features in (restarted, going_on):
-        features.start(simulation.observe(), cranes)
+        features.start(simulation.observe(), lifts)
     output = np.full(3, 0.3)
     for _ in range(50):
         commands = [features.command(output) for features in (restarted, going_on)]
@@ -79,9 +79,9 @@ def test_a_row_that_starts_anew_forgets_its_own_past_alone():
         for features in (restarted, going_on):
             features.advance(simulation.observe())
     one = np.array([1])
-    first = restarted.start(simulation.observe()[one], cranes[:1], one)
+    first = restarted.start(simulation.observe()[one], lifts[:1], one)
     fresh = Features(1, FeatureConfig.of(simulation.config))
-    np.testing.assert_array_equal(first, fresh.start(simulation.observe()[one], cranes[:1]))
+    np.testing.assert_array_equal(first, fresh.start(simulation.observe()[one], lifts[:1]))
     for features, count in ((restarted, 3), (going_on, 3), (fresh, 1)):
         features.command(output[:count])
     simulation.advance(commands[0])
@@ -101,7 +101,7 @@ def test_without_output_the_drum_takes_up_the_pulleys_motion(observation):
     drawn = [simulation.draw(rng) for _ in range(8)]
     simulation.reset_rows(np.arange(8), drawn)
     features = Features(8, FeatureConfig.of(simulation.config))
-    features.start(simulation.observe(), [scenario.crane for scenario, _ in drawn])
+    features.start(simulation.observe(), [scenario for scenario, _ in drawn])
     rope_end, pulley = [], []
     radius = drawn[0][0].crane.winch.drum_radius
     for _ in range(300):
@@ -119,7 +119,7 @@ def test_an_output_moves_the_ropes_end():
     simulation = Simulation(2, TaskConfig(control_period=PERIOD))
     simulation.reset_rows(np.arange(2), [(scenario, 0)] * 2)
     features = Features(2, FeatureConfig.of(simulation.config))
-    features.start(simulation.observe(), [scenario.crane] * 2)
+    features.start(simulation.observe(), [scenario] * 2)
     angles = []
     for _ in range(30):
         simulation.advance(features.command(np.array([1.0, -0.5])))
@@ -137,7 +137,7 @@ def test_the_speed_action_is_the_drums_speed(observation):
     drawn = [simulation.draw(rng) for _ in range(2)]
     simulation.reset_rows(np.arange(2), drawn)
     features = Features(2, FeatureConfig.of(simulation.config, "speed"))
-    features.start(simulation.observe(), [scenario.crane for scenario, _ in drawn])
+    features.start(simulation.observe(), [scenario for scenario, _ in drawn])
     most = drawn[0][0].crane.winch.max_speed
     for output in (0.01, -0.02, 0.03):
         command = features.command(np.array([output, 2.0]))

@@ -23,7 +23,7 @@ def begun(rows, observation="state", steps=0, source=ROUGH, seed=3):
     drawn = [simulation.draw(rng) for _ in range(rows)]
     simulation.reset_rows(np.arange(rows), drawn)
     features = PlanFeatures(rows, FeatureConfig.of(simulation.config, "predictive"))
-    values = [features.start(simulation.observe(), [scenario.crane for scenario, _ in drawn])]
+    values = [features.start(simulation.observe(), [scenario for scenario, _ in drawn])]
     for _ in range(steps):
         simulation.advance(features.command(np.zeros(rows)))
         values.append(features.advance(simulation.observe()))
@@ -86,9 +86,9 @@ def test_a_row_that_starts_anew_forgets_its_own_past_alone():
     _, going_on, _ = begun(3, "sensors", steps=60)
     scenario, seed = simulation.draw(np.random.default_rng(9))
     simulation.reset_rows(np.array([1]), [(scenario, seed)])
-    first = features.start(simulation.observe()[[1]], [scenario.crane], np.array([1]))
+    first = features.start(simulation.observe()[[1]], [scenario], np.array([1]))
     fresh = PlanFeatures(1, FeatureConfig.of(simulation.config, "predictive"))
-    np.testing.assert_allclose(first, fresh.start(simulation.observe()[[1]], [scenario.crane]), atol=1e-6)
+    np.testing.assert_allclose(first, fresh.start(simulation.observe()[[1]], [scenario]), atol=1e-6)
     # Row 1 now sees another load: the filters of the other rows must not.
     command = features.command(np.zeros(3))
     assert command[[0, 2]] == pytest.approx(going_on.command(np.zeros(3))[[0, 2]], abs=1e-12)

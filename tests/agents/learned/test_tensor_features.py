@@ -8,7 +8,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aframe_env import Crane, InvalidValue, Rope, Sensors, Winch
+from aframe_env import Crane, InvalidValue, Rope, Scenario, Sensors, Winch
 from aframe_env.task import STATE
 from agents.control.expected_waves import ExpectedWaves
 from agents.learned.features import STATE_FEATURES, FeatureConfig, Features
@@ -74,7 +74,7 @@ def test_features_and_commands_are_those_of_arrays(
         want = arrays.advance(observed) if step else np.empty((rows, len(STATE_FEATURES)), dtype=np.float32)
         begun = np.flatnonzero(first)
         if len(begun):
-            want[begun] = arrays.start(observed[begun], [crane] * len(begun), begun)
+            want[begun] = arrays.start(observed[begun], [Scenario(crane=crane)] * len(begun), begun)
         got = tensors.look(torch.from_numpy(observed), torch.from_numpy(first))
         assert got.dtype == torch.float32
         # Single precision: what the features are rounded to.

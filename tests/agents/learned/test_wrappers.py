@@ -49,7 +49,7 @@ def test_observations_are_the_agents_own_features(observation, action):
     first, _ = bare.reset(seed=3)
     features = features_for(1, FeatureConfig.of(bare.unwrapped.simulation.config, action))
     assert env.feature_names == features.names
-    np.testing.assert_array_equal(seen, features.start(first[None], [bare.unwrapped.scenario.crane])[0])
+    np.testing.assert_array_equal(seen, features.start(first[None], [bare.unwrapped.scenario])[0])
     for output in outputs(40, 1)[:, 0]:
         seen, _, _, _, info = env.step(output)
         observed, _, _, _, same = bare.step(features.command(output.astype(np.float64)))

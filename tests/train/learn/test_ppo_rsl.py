@@ -88,7 +88,7 @@ def test_features_across_restarts_are_those_of_the_agents(action: Action) -> Non
     training = TrainingRows(env, features, drift_limit=0.4, reward_scale=2.0, reward_knee=1.0)
     arrays = Features(6, config)
     observed = env.get_observations()[GROUP].numpy()
-    want = arrays.start(observed, [source.crane] * 6)
+    want = arrays.start(observed, [source.nominal()] * 6)
     np.testing.assert_allclose(training.get_observations()[GROUP], want, rtol=1e-5, atol=1e-5)
     generator, restarts = torch.Generator().manual_seed(2), 0
     for _ in range(70):
@@ -99,7 +99,7 @@ def test_features_across_restarts_are_those_of_the_agents(action: Action) -> Non
         want = arrays.advance(observed)
         begun = np.flatnonzero(dones.numpy())
         if len(begun):
-            want[begun] = arrays.start(observed[begun], [source.crane] * len(begun), begun)
+            want[begun] = arrays.start(observed[begun], [source.nominal()] * len(begun), begun)
         np.testing.assert_allclose(seen[GROUP], want, rtol=1e-5, atol=1e-5)
         restarts += len(begun)
     assert restarts > 12

@@ -28,7 +28,7 @@ def test_rows_are_the_environments():
     for i, scenario in enumerate(rows._simulation.scenarios):
         env, features = AFrameHeaveEnv(scenario=scenario), Features(1, FeatureConfig())
         first, _ = env.reset(seed=0)
-        np.testing.assert_array_equal(features.start(first[None], [scenario.crane])[0], observed[i])
+        np.testing.assert_array_equal(features.start(first[None], [scenario])[0], observed[i])
         envs.append((env, features))
     actions = np.array([[0.1], [-0.2], [0.0]], dtype=np.float32)
     for _ in range(8):
