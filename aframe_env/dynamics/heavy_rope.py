@@ -117,7 +117,8 @@ def begin_water(row: Array, span: Span) -> None:
         x, y = current(row, position.z, lanes, j)
         row[at.FLOW * lanes + j] = x
         row[(at.FLOW + 1) * lanes + j] = y
-        push, drag = Vector(0.0, 0.0, 0.0), row[at.ACROSS_DRAG * lanes + j]
+        push = hold = Vector(0.0, 0.0, 0.0)
+        drag = row[at.ACROSS_DRAG * lanes + j]
         if drag > 0.0:
             away = math.sqrt(inner(line, line) + 1e-18)
             axis = scaled(1.0 / away, line)
@@ -130,7 +131,9 @@ def begin_water(row: Array, span: Span) -> None:
                 across = along(through, -inner(axis, through), axis)
                 force = -drag * (away / pieces) * math.sqrt(inner(across, across))
                 push = along(push, lever * force, across)
+                hold = along(hold, (1.0 - lever) * force, across)
         put_three(row, at.PUSH, lanes, j, push)
+        put_three(row, at.PUSH + 3, lanes, j, hold)
 
 
 @scalar

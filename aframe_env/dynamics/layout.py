@@ -163,8 +163,8 @@ ENDS: Final = _take(3 * END_SIZE)
 acceleration, unstretched length between drum and load, and its rate."""
 FLOW: Final = _take(2)
 """Current about the load over a segment: x and y, m/s."""
-PUSH: Final = _take(3)
-"""What the drag of water across the rope hands on to the load over a segment, N."""
+PUSH: Final = _take(6)
+"""What the drag of water across the rope hands on to the load over a segment, and to the pulley, N."""
 STAGE: Final = _take(32)
 """What the parts of a stage tell each other, see ``heavy_rope``."""
 
