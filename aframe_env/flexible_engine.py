@@ -12,7 +12,7 @@ from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.flexible import layout as flex
 from aframe_env.dynamics.flexible.readout import READOUTS, readout_kernel
 from aframe_env.dynamics.flexible.step import flexible_kernels
-from aframe_env.dynamics.start import INNER_STEP_DECAY, inner_steps
+from aframe_env.dynamics.start import inner_steps, longest_inner_step
 from aframe_env.engine import Engine, FloatArray, Timing
 from aframe_env.rfem.reduction import STATIC_SHAPES
 from aframe_env.rfem.structure import Division
@@ -25,9 +25,7 @@ from aframe_env.validation import InvalidValue, require_integer, shown
 FLEXIBLE_STEP: Final = 0.0125
 """Longest inner step, s."""
 ROPE_PHASE: Final = 0.25
-"""Most that the load's bobbing on the rope turns in one inner step, rad; the scheme is stable up to some 2.4."""
-CHAIN_SHARE: Final = 0.5
-"""Most of the longest step that is stable for a heavy rope by itself."""
+"""Most that the load's bobbing on a light rope turns in one inner step, rad; the scheme is stable up to some 2.4."""
 MOST_RFES: Final = 100
 """Most elements of a member: the modes of a finer frame take too long to find."""
 
@@ -70,14 +68,10 @@ def mesh_of(model: str, rfes: Sequence[int] | None, modes: int | None) -> Mesh |
 
 
 def longest_rope_step(scenario: Scenario) -> float:
-    """Longest inner step that a scenario's rope allows, s.
-
-    A heavy one is stepped explicitly, so that its own waves and its damping count, too.
-    """
-    longest = ROPE_PHASE / scenario.rope_frequency
+    """Longest inner step that a scenario's rope allows, s; a heavy one is stepped as in the simplified model."""
     if scenario.is_light:
-        return longest
-    return min(longest, CHAIN_SHARE * scenario.chain_step, INNER_STEP_DECAY / max(scenario.rope_damping_rate, 1e-9))
+        return ROPE_PHASE / scenario.rope_frequency
+    return min(scenario.chain_step, longest_inner_step(scenario.rope_frequency, scenario.rope_damping_rate))
 
 
 class FlexibleEngine(Engine):
