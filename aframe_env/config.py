@@ -62,8 +62,6 @@ class TaskConfig:
             require_choice("observation", self.observation, ("state", "sensors"))
         object.__setattr__(self, "source", scenario_source(self.scenario))
         object.__setattr__(self, "mesh", mesh_of(self.model, self.rfes, self.rfem_modes))
-        if self.mesh is not None:
-            self.nominal.require_light('environments with model="rfem"')
 
     @property
     def steps(self) -> int:

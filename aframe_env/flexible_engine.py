@@ -12,7 +12,7 @@ from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.flexible import layout as flex
 from aframe_env.dynamics.flexible.readout import READOUTS, readout_kernel
 from aframe_env.dynamics.flexible.step import flexible_kernels
-from aframe_env.dynamics.start import inner_steps
+from aframe_env.dynamics.start import inner_steps, longest_inner_step
 from aframe_env.engine import Engine, FloatArray, Timing
 from aframe_env.rfem.reduction import STATIC_SHAPES
 from aframe_env.rfem.structure import Division
@@ -25,7 +25,7 @@ from aframe_env.validation import InvalidValue, require_integer, shown
 FLEXIBLE_STEP: Final = 0.0125
 """Longest inner step, s."""
 ROPE_PHASE: Final = 0.25
-"""Most that the load's bobbing on the rope turns in one inner step, rad; the scheme is stable up to some 2.4."""
+"""Most that the load's bobbing on a light rope turns in one inner step, rad; the scheme is stable up to some 2.4."""
 MOST_RFES: Final = 100
 """Most elements of a member: the modes of a finer frame take too long to find."""
 
@@ -67,6 +67,17 @@ def mesh_of(model: str, rfes: Sequence[int] | None, modes: int | None) -> Mesh |
     return Mesh(Division(leg=rfes[0], beam=rfes[1]), modes)
 
 
+def longest_rope_step(scenario: Scenario) -> float:
+    """Longest inner step that a scenario's rope allows, s; a heavy one is stepped as in the simplified model."""
+    if scenario.is_light:
+        return ROPE_PHASE / scenario.rope_frequency
+    return min(
+        scenario.chain_step,
+        scenario.attached_step,
+        longest_inner_step(scenario.rope_frequency, scenario.rope_damping_rate),
+    )
+
+
 class FlexibleEngine(Engine):
     """Rows of the full model side by side, each with its own scenario; frames may differ from row to row."""
 
@@ -101,13 +112,12 @@ class FlexibleEngine(Engine):
 
     def row_vector(self, scenario: Scenario) -> FloatArray:
         """Slots of a row at the start of a scenario, the frame's first: (frame slots + slots,)."""
-        scenario.require_light('environments with model="rfem"')
         row = super().row_vector(scenario)
         frame = np.zeros(self._slots)
         frame[flex.FRAME] = self._line(scenario)
         frame[flex.DRUM : flex.DRUM + 3] = scenario.crane.drum_position
         comoving = float(scenario.initial == "comoving")
-        flexible_kernels(1).start(row[None], frame[None], self._tables, comoving)
+        flexible_kernels(1, heavy=not scenario.is_light).start(row[None], frame[None], self._tables, comoving)
         return np.concatenate([frame, row])
 
     def _node_segments(self, scenario: Scenario, components: Components, times: Timing) -> int:
@@ -119,6 +129,8 @@ class FlexibleEngine(Engine):
         block, lane = divmod(index, self._lanes)
         self._frame_view[block, :, lane] = vector[: self._slots]
         super().write_row(index, vector[self._slots :])
+        if vector[self._slots + at.SPRINGS] > 0.0:
+            self._flexible_kernels = flexible_kernels(self._lanes, heavy=True)
 
     def copy_row(self, index: int) -> FloatArray:
         """Return everything the engine knows of a row: (frame slots + slots,)."""
@@ -151,7 +163,7 @@ class FlexibleEngine(Engine):
         segment = self.control_period / self._segments
         longest = self._max_inner_step or FLEXIBLE_STEP
         # Halved rather than fitted, so that a distribution of ropes needs few tables.
-        while longest * scenario.rope_frequency > ROPE_PHASE:
+        while longest > longest_rope_step(scenario):
             longest *= 0.5
         return Timing(self._segments, segment, inner_steps(segment, longest))
 

@@ -12,7 +12,7 @@ from aframe_env.cuda.drawing import begin_episode, copy_row, draw_lift, draw_mot
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.layout import LANES, Span
 from aframe_env.dynamics.random import draw_seed
-from aframe_env.dynamics.step import control_step
+from aframe_env.dynamics.step import control_step, lane_control_step
 from aframe_env.scenario import NUMBERS
 from aframe_env.task import charge_parted, clip_row, read_out
 
@@ -38,6 +38,30 @@ def advance(
         row = blocks[cuda.blockIdx.x]
         row[at.COMMAND * LANES + j] = actions[i, 0]
         control_step(row, room, segments, records, Span(LANES, j, j + 1))
+        charge_parted(row, episode_duration, LANES, j)
+        read_out(row, LANES, j, state, results, i)
+        clip_row(state, low, high, observation, i)
+
+
+def advance_any(
+    blocks: Array,
+    room: int,
+    segments: int,
+    records: Array,
+    actions: Array,
+    episode_duration: float,
+    state: Array,
+    results: Array,
+    low: Array,
+    high: Array,
+    observation: Array,
+) -> None:
+    """Advance as ``advance`` does, rows with ropes that have mass and loads in water too: it takes long to compile."""
+    i, j = cuda.grid(1), cuda.threadIdx.x
+    if i < actions.shape[0]:
+        row = blocks[cuda.blockIdx.x]
+        row[at.COMMAND * LANES + j] = actions[i, 0]
+        lane_control_step(row, room, segments, records, Span(LANES, j, j + 1))
         charge_parted(row, episode_duration, LANES, j)
         read_out(row, LANES, j, state, results, i)
         clip_row(state, low, high, observation, i)
@@ -116,6 +140,7 @@ class Kernels(NamedTuple):
     """The functions above, compiled for the device when they are first launched."""
 
     advance: Any
+    advance_any: Any
     repeat: Any
     draw: Any
 
@@ -124,4 +149,4 @@ class Kernels(NamedTuple):
 def kernels() -> Kernels:
     """Kernels for the device."""
     compiler: Callable[..., Any] = cuda.jit
-    return Kernels(compiler(advance), compiler(repeat), compiler(draw))
+    return Kernels(compiler(advance), compiler(advance_any), compiler(repeat), compiler(draw))

@@ -29,11 +29,13 @@ class CudaRows:
         self.device = device
         self._rows = rows
         self._duration = host.episode_duration
-        self._kernels = kernels()
         self._blocks_of_threads = -(-rows // LANES)
         source = host.source
-        host.config.nominal.require_light("environments on a CUDA device")
+        if not isinstance(source, Scenario):
+            source.nominal().require_light("scenarios drawn on a CUDA device")
         self._components = _count_components(source)
+        self._kernels = kernels()
+        self._advance = self._kernels.advance if host.config.nominal.is_light else self._kernels.advance_any
         engine = Engine(1, host.control_period, self._components, host.config.max_inner_step)
         vector = engine.row_vector(host.config.nominal)
         self._room = (len(vector) - at.ROW_SLOTS) // at.COMPONENT_SLOTS
@@ -93,7 +95,7 @@ class CudaRows:
         """Advance by one control step: observation (N, 14), cost (N,) m² s, whose ropes have parted (N,)."""
         observation = torch.empty((self._rows, len(task.STATE)), dtype=torch.float32, device=self.device)
         self._launch(
-            self._kernels.advance,
+            self._advance,
             self._blocks,
             self._room,
             self._segments,

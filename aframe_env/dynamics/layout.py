@@ -232,8 +232,8 @@ SURFACE: Final = _take(2)
 """Level of the surface about the load at the start of a segment, m, and its rate, m/s."""
 MOMENT: Final = _take(1)
 """Time since the start of the segment at which the water about the load is taken, s."""
-PUSH: Final = _take(3)
-"""What the drag of water across the rope hands on to the load over a segment, N."""
+PUSH: Final = _take(6)
+"""What the drag of water across the rope hands on to the load over a segment, and to the pulley, N."""
 STAGE: Final = _take(35)
 """What the parts of a stage tell each other, see ``heavy_rope``."""
 

@@ -27,7 +27,7 @@ from aframe_env.dynamics.motion import (
     start_motion,
 )
 from aframe_env.dynamics.target import move_target
-from aframe_env.dynamics.water import begin_water
+from aframe_env.dynamics.water import begin_water, begin_water_at_node
 from aframe_env.dynamics.winch import drum_state, next_error, plan
 
 Array = npt.NDArray[np.float64]
@@ -273,11 +273,7 @@ def measure_any(row: Array, span: Span) -> None:
 @scalar
 def start_any(row: Array, span: Span) -> None:
     """Meet the water, and measure tension and slackness of lanes with ropes of either kind, at the start."""
-    lanes = span.stride
-    for j in range(span.begin, span.end):
-        # The start is a node.
-        row[at.ELAPSED * lanes + j] = row[at.NODE_SEGMENTS * lanes + j] * row[at.CONTROL_PERIOD * lanes + j]
-    begin_water(row, span)
+    begin_water_at_node(row, span)
     measure_any(row, span)
 
 

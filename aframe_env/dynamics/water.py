@@ -99,7 +99,8 @@ def begin_water(row: Array, span: Span) -> None:
         row[at.SURFACE * lanes + j] = row[at.SURFACE_LEVEL * lanes + j] + elevation
         row[(at.SURFACE + 1) * lanes + j] = rising
         row[at.MOMENT * lanes + j] = 0.0
-        push, drag = Vector(0.0, 0.0, 0.0), row[at.ACROSS_DRAG * lanes + j]
+        push = hold = Vector(0.0, 0.0, 0.0)
+        drag = row[at.ACROSS_DRAG * lanes + j]
         if drag > 0.0:
             away = math.sqrt(inner(line, line) + 1e-18)
             axis = scaled(1.0 / away, line)
@@ -112,4 +113,15 @@ def begin_water(row: Array, span: Span) -> None:
                 across = along(through, -inner(axis, through), axis)
                 force = -drag * (away / pieces) * math.sqrt(inner(across, across))
                 push = along(push, lever * force, across)
+                hold = along(hold, (1.0 - lever) * force, across)
         put_three(row, at.PUSH, lanes, j, push)
+        put_three(row, at.PUSH + 3, lanes, j, hold)
+
+
+@scalar
+def begin_water_at_node(row: Array, span: Span) -> None:
+    """Do what ``begin_water`` does where the motion is at its next node."""
+    lanes = span.stride
+    for j in range(span.begin, span.end):
+        row[at.ELAPSED * lanes + j] = row[at.NODE_SEGMENTS * lanes + j] * row[at.CONTROL_PERIOD * lanes + j]
+    begin_water(row, span)

@@ -77,6 +77,7 @@ class DynamicCase:
     """s."""
 
     def __post_init__(self) -> None:
+        self.scenario.require_light("stand-alone runs of the full model")
         require_number("duration", self.duration, "s", low=0.0, low_open=True)
         require_number("step", self.step, "s", low=0.0, low_open=True)
         require_number("output_interval", self.output_interval, "s", low=0.0, low_open=True)

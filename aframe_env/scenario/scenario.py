@@ -24,6 +24,14 @@ FASTEST_BOBBING: Final = 1e4
 """Greatest angular frequency of a load bobbing on its rope, rad/s: the inner step follows it."""
 SHORTEST_CHAIN_STEP: Final = 1e-4
 """Shortest inner step that a rope with mass may ask for, s."""
+FASTEST_FLOW: Final = 10.0
+"""Speed through the water up to which the inner step is stable, m/s."""
+SURFACE_ZONE: Final = 20.0
+"""Depth of the target above which the inner step is short enough for the surface's slam, m."""
+SLAMMING_SPEED: Final = 3.0
+"""Speed through the surface that the inner step is for, m/s."""
+SLAM_SHARE: Final = 0.05
+"""Share of that speed that a slam may take in an inner step."""
 FASTEST_DECAY: Final = 1e6
 """Greatest damping of a rope for each kilogram of load, 1/s: the inner step follows it."""
 
@@ -170,9 +178,9 @@ class Scenario:
         """Raise where the waves in the rope are too fast for the inner step."""
         if self.attached_step < SHORTEST_CHAIN_STEP:
             raise InvalidValue(
-                f"a passive compensator or seabed as stiff or as little or much damped as this needs steps of "
-                f"{self.attached_step:.2g} s with a load of {self.load_mass:g} kg: must be at least "
-                f"{SHORTEST_CHAIN_STEP:g} s"
+                f"seabed, compensator, or drag and slam on a load of {self.load_mass:g} kg need steps of "
+                f"{self.attached_step:.2g} s: must be at least {SHORTEST_CHAIN_STEP:g} s: make them softer or smaller, "
+                "or the load heavier"
             )
         if self.chain_step < SHORTEST_CHAIN_STEP:
             raise InvalidValue(
@@ -277,20 +285,39 @@ class Scenario:
 
     @property
     def attached_step(self) -> float:
-        """Longest stable inner step for seabed and passive compensator, s; inf without them."""
-        step, mass = math.inf, self.load_mass
-        if self.water is not None and self.water.seabed is not None:
+        """Longest inner step for what is about load and drum, s; inf in air with nothing attached.
+
+        Stable for seabed, drag and passive compensator, and short beside the surface's slam.
+        """
+        rates = [self._compensator_rate, *self._water_rates]
+        return 1.0 / max(rates) if any(rates) else math.inf
+
+    @property
+    def _compensator_rate(self) -> float:
+        """Rate at which a passive compensator gives way to the rope's spring, halved, 1/s."""
+        if self.crane.compensator is None:
+            return 0.0
+        below, drum_part = self.lengths
+        top = drum_part + (0.45 * below / (self.springs - 1) if self.springs > 1 else 0.9 * below)
+        stiffness = self.crane.rope.axial_stiffness / top
+        return 0.5 * stiffness / (self.crane.compensator.damping + stiffness * self.loss_time)
+
+    @property
+    def _water_rates(self) -> list[float]:
+        """Rates that seabed, drag and slam change the load's velocity at, each by what a step may be of it, 1/s."""
+        if self.water is None:
+            return []
+        load, mass, half_density = self.load, self.load_mass, 0.5 * self.density
+        rates = [
+            half_density * load.drag_area_vertical * FASTEST_FLOW / (mass + load.added_mass_vertical),
+            half_density * load.drag_area_horizontal * FASTEST_FLOW / (mass + load.added_mass_horizontal),
+        ]
+        if self.water.seabed is not None:
             bed = self.water.seabed
-            step = min(step, 0.5 * math.sqrt(mass / bed.stiffness))
-            if bed.damping:
-                step = min(step, mass / bed.damping)
-        if self.crane.compensator is not None:
-            below, drum_part = self.lengths
-            top = drum_part + (0.45 * below / (self.springs - 1) if self.springs > 1 else 0.9 * below)
-            stiffness = self.crane.rope.axial_stiffness / top
-            rate = stiffness / (self.crane.compensator.damping + stiffness * self.loss_time)
-            step = min(step, 2.0 / rate)
-        return step
+            rates += [2.0 * math.sqrt(bed.stiffness / mass), bed.damping / mass]
+        if self.target_levels[1] + load.height > self.water.surface_level - SURFACE_ZONE:
+            rates.append(half_density * max(load.slam_area, load.exit_area) * SLAMMING_SPEED / mass / SLAM_SHARE)
+        return rates
 
     @property
     def loss_time(self) -> float:

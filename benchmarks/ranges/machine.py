@@ -123,9 +123,8 @@ class Rows(RuleBasedStateMachine):
 
     @rule(scenario=values.scenarios())
     def reset_to(self, scenario: Scenario) -> None:
-        """Reset all rows to a scenario, which the full model takes without water or mass of the rope alone."""
-        if scenario.is_light or self.together.simulation.config.model == "simplified":
-            self._reset(np.ones(self.rows, dtype=bool), None, scenario)
+        """Reset all rows to a scenario."""
+        self._reset(np.ones(self.rows, dtype=bool), None, scenario)
 
     @rule()
     def save(self) -> None:

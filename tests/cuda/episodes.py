@@ -7,12 +7,23 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 
-from aframe_env import Crane, HarmonicMotion, RecordedMotion, Rope, Scenario, ScenarioDistribution, Winch
+from aframe_env import (
+    Crane,
+    HarmonicMotion,
+    LoadShape,
+    RecordedMotion,
+    Rope,
+    Scenario,
+    ScenarioDistribution,
+    Water,
+    Winch,
+)
 from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
 
 
@@ -28,6 +39,12 @@ _TIMES = np.linspace(0.0, 2.0, 21)
 RECORDED = RecordedMotion(times=_TIMES, coordinates=np.outer(np.sin(_TIMES), [0.5, 0.2, 1.0, 0.02, 0.03, 0.01]))
 LAGGING = Crane(winch=Winch(lag=0.3))
 FRAGILE = Crane(rope=Rope(breaking_load=1.0e6))
+WET = Scenario.paper(
+    crane=Crane(rope=Rope.six_strand()),
+    target_level=-1000.0,
+    water=Water(current=((0.0, 0.5, 0.2), (300.0, -0.1, 0.3))),
+    load=LoadShape(volume=12.7, added_mass_vertical=8e4, added_mass_horizontal=3e4, drag_area_vertical=60.0),
+)
 
 CASES = {
     "random seas": Case({"episode_duration": 0.5}),
@@ -61,6 +78,8 @@ CASES = {
     "the paper's motion": Case({"scenario": Scenario.paper("rest", crane=LAGGING), "episode_duration": 0.6}),
     "a recorded motion": Case({"scenario": Scenario(motion=RECORDED, load_mass=3e4), "episode_duration": 0.7}),
     "a rope that parts": Case({"scenario": Scenario.paper(crane=FRAGILE), "episode_duration": 1.0}),
+    "a rope with mass, in water": Case({"scenario": WET, "episode_duration": 0.3}, 2, 5),
+    "a load in water on a short rope": Case({"scenario": replace(WET, target_level=-60.0), "episode_duration": 0.4}),
 }
 
 

@@ -15,6 +15,10 @@ import numpy as np
 import pytest
 import torch
 
+from aframe_env import Crane, InvalidValue, Rope, ScenarioDistribution
+from aframe_env.config import TaskConfig
+from aframe_env.simulation import Simulation
+
 pytest.importorskip("tensordict", reason='tensordict is not installed (extra "cuda")')
 pytest.importorskip("numba_cuda", reason='numba-cuda is not installed (extra "cuda")')
 
@@ -62,6 +66,14 @@ def test_the_device_s_episodes_are_the_processor_s(name: str) -> None:
     compare(lambda key: results[key], name)
 
 
+def test_ropes_with_mass_are_not_drawn_on_a_device() -> None:
+    from aframe_env.cuda.rows import CudaRows
+
+    host = Simulation(1, TaskConfig(scenario=ScenarioDistribution(crane=Crane(rope=Rope.six_strand()))))
+    with pytest.raises(InvalidValue, match=r"mass_per_length = 19\.55 kg/m.*drawn on a CUDA device"):
+        CudaRows(host, 1, torch.device("cpu"))
+
+
 def test_the_compiler_accepts_the_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
     """The simulator takes anything that is Python; the compiler's types and intermediate code need no GPU either."""
     from numba import complex128, float32, float64, int64, uint8, void
@@ -79,6 +91,7 @@ def test_the_compiler_accepts_the_kernels(monkeypatch: pytest.MonkeyPatch) -> No
     tables = (vector, matrix, vector, matrix, vector, vector, vector, complex128[:, :, ::1])
     signatures: dict[Any, tuple[Any, ...]] = {
         kernels.advance: (*rows, singles, float64, *outputs),
+        kernels.advance_any: (*rows, singles, float64, *outputs),
         kernels.repeat: (matrix, mask, vector, *outputs),
         kernels.draw: (*rows, mask, int64, int64[::1], *tables, *outputs),
         winch_cuda.invert: (vector, vector, float64, float64, float64, float64, vector),

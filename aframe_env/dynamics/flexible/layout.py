@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from aframe_env.dynamics.layout import LIFT_SIZE
+
 # A row's slots: parameters and state.
 FRAME: Final = 0
 """Line of the row's frame in the tables."""
@@ -37,7 +39,9 @@ TIP: Final = CARRIED + 9 * CARRIED_MOST
 """Displacement of S and its rate at the end of the step but for the coming pull of the rope, 6."""
 ACTIVE: Final = TIP + 6
 """1 where the row takes part in the inner step that is under way."""
-MODES: Final = ACTIVE + 1
+HELD: Final = ACTIVE + 1
+"""Load and lumps of a rope with mass at the start of the inner step, as in LIFT of ``aframe_env.dynamics.layout``."""
+MODES: Final = HELD + LIFT_SIZE
 """MODE_SLOTS for each mode from here on."""
 POSITION: Final = 0
 RATE: Final = 1

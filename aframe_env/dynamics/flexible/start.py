@@ -41,16 +41,17 @@ def start_rows(row: Array, frame: Array, tables: Array, comoving: float, lanes: 
     deck_now(row, frame, lanes)
     for j in range(lanes):
         table = tables[int(frame[flex.FRAME * lanes + j])]
-        deflection = rest(row, frame, table, lanes, j)
+        deflection = rest(row, frame, table, row[at.GRAVITY * lanes + j] * row[at.MASS * lanes + j], lanes, j)
         place_load(row, frame, deflection, comoving, lanes, j)
-        release(row, frame, table, deflection, lanes, j)
+        pull_head(row, frame, deflection, lanes, j)
+        release(row, frame, table, lanes, j)
 
 
 @scalar
-def rest(row: Array, frame: Array, table: Array, lanes: int, j: int) -> Vector:
-    """Put the modes at rest under own weight and the load's; return the deflection of S."""
+def rest(row: Array, frame: Array, table: Array, weight: float, lanes: int, j: int) -> Vector:
+    """Put the modes at rest under own weight and the rope's tension ``weight`` [N]; return the deflection of S."""
     modes = int(table[flex.COUNT])
-    gravity, weight = row[at.GRAVITY * lanes + j], row[at.GRAVITY * lanes + j] * row[at.MASS * lanes + j]
+    gravity = row[at.GRAVITY * lanes + j]
     w1, w2, w3 = 0.0, 0.0, 0.0
     for i in range(modes):
         c = flex.HEAD + flex.MODE_SIZE * i
@@ -84,6 +85,12 @@ def place_load(row: Array, frame: Array, deflection: Vector, comoving: float, la
     inboard, _ = unit(difference(three(frame, flex.DRUM, lanes, j), pulley))
     weight = row[at.GRAVITY * lanes + j] * row[at.MASS * lanes + j]
     hanging = row[at.FREE_LENGTH * lanes + j] * (1.0 + weight / row[at.AXIAL_STIFFNESS * lanes + j]) - inboard
+    put_below(row, frame, pulley, hanging, comoving, lanes, j)
+
+
+@scalar
+def put_below(row: Array, frame: Array, pulley: Vector, hanging: float, comoving: float, lanes: int, j: int) -> Vector:
+    """Put the load ``hanging`` m below S, which is at ``pulley`` in {D}; return the velocity of S."""
     turned = nine(frame, flex.ROTATION, lanes, j)
     place = add(three(frame, flex.ORIGIN, lanes, j), apply(turned, pulley))
     turning = apply(turned, cross(three(frame, flex.SPIN, lanes, j), pulley))
@@ -91,11 +98,12 @@ def place_load(row: Array, frame: Array, deflection: Vector, comoving: float, la
     put_three(row, at.LOAD_POSITION, lanes, j, Vector(place.x, place.y, place.z - hanging))
     put_three(row, at.LOAD_VELOCITY, lanes, j, scaled(comoving, velocity))
     row[at.OMEGA2 * lanes + j] = abs(row[(at.LOAD_POSITION + 2) * lanes + j] - row[at.TARGET * lanes + j])
+    return velocity
 
 
 @scalar
-def release(row: Array, frame: Array, table: Array, deflection: Vector, lanes: int, j: int) -> None:
-    """Find the rope force at the start, and the accelerations of load and modes that follow from it."""
+def pull_head(row: Array, frame: Array, deflection: Vector, lanes: int, j: int) -> None:
+    """Find the rope's force at the start, and the load's acceleration that follows from it."""
     pulley = add(three(row, at.PULLEY_ON_DECK, lanes, j), deflection)
     turned = nine(frame, flex.ROTATION, lanes, j)
     load, velocity = three(row, at.LOAD_POSITION, lanes, j), three(row, at.LOAD_VELOCITY, lanes, j)
@@ -128,6 +136,11 @@ def release(row: Array, frame: Array, table: Array, deflection: Vector, lanes: i
     row[at.TENSION * lanes + j] = force
     row[at.PEAK_TENSION * lanes + j] = force
     row[at.SLACK * lanes + j] = 1.0 if force <= 0.0 else 0.0
+
+
+@scalar
+def release(row: Array, frame: Array, table: Array, lanes: int, j: int) -> None:
+    """Find the accelerations of the modes at the start, PULL being known."""
     modes, carried = int(table[flex.COUNT]), int(table[flex.CARRIED_COUNT])
     for b in range(carried):
         place = frame[(flex.MODES + flex.MODE_SLOTS * b + flex.POSITION) * lanes + j]

@@ -16,6 +16,7 @@ from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar
 from aframe_env.dynamics.flexible import layout as flex
 from aframe_env.dynamics.flexible.deck import advance_deck, deck_at
 from aframe_env.dynamics.flexible.frame import newmark_correct, newmark_predict
+from aframe_env.dynamics.flexible.heavy import start_heavy_rows, step_heavy_rope
 from aframe_env.dynamics.flexible.rope import (
     Compliance,
     PaidOut,
@@ -28,8 +29,9 @@ from aframe_env.dynamics.flexible.rope import (
 )
 from aframe_env.dynamics.flexible.start import start_rows
 from aframe_env.dynamics.layout import LANES, Span
-from aframe_env.dynamics.step import drum_at, plan_winch
+from aframe_env.dynamics.step import drum_at, plan_any, plan_winch
 from aframe_env.dynamics.vector import Vector, add, difference, scaled
+from aframe_env.dynamics.water import begin_water_at_node
 from aframe_env.dynamics.winch import next_error
 
 Array = npt.NDArray[np.float64]
@@ -39,13 +41,13 @@ LOAD_BETA: Final = 1.0 / 12.0
 
 
 @scalar
-def step_rope_and_load(row: Array, frame: Array, table: Array, index: int, lanes: int) -> None:
+def step_rope_and_load(row: Array, frame: Array, table: Array, index: int, span: Span) -> None:
     """Bring drum and load to the end of inner step ``index``, and find the rope's force there."""
-    h = table[flex.STEP]
+    h, lanes = table[flex.STEP], span.stride
     tip, tip_rate = nine(table, flex.COMPLIANCE, 1, 0), nine(table, flex.COMPLIANCE_RATE, 1, 0)
     late, half = LOAD_BETA * h * h, 0.5 * h
     early = (0.5 - LOAD_BETA) * h * h
-    for j in range(lanes):
+    for j in range(span.begin, span.end):
         active = frame[flex.ACTIVE * lanes + j] > 0.0
         first, decay = row[(at.WINCH + 3) * lanes + j], row[at.HALF_STEP_DECAY * lanes + j]
         error0 = row[(at.WINCH + 4) * lanes + j]
@@ -136,28 +138,61 @@ def mark_active(row: Array, frame: Array, line: float, index: int, lanes: int) -
 
 
 @scalar
-def control_step(
-    row: Array, frame: Array, tables: Array, components: int, segments: int, records: Array, lanes: int
-) -> None:
-    """Advance a block by one control step of ``segments`` motion segments, the command held."""
-    most = 0.0
-    for j in range(lanes):
-        row[at.STEP_COST * lanes + j] = 0.0
-        row[at.PEAK_TENSION * lanes + j] = 0.0
-        row[at.SLACK * lanes + j] = 0.0
-        most = row[at.SUBSTEPS * lanes + j] if row[at.SUBSTEPS * lanes + j] > most else most
-    for _ in range(segments):
-        advance_deck(row, frame, components, records, lanes)
-        plan_winch(row, Span(lanes, 0, lanes))
-        for index in range(int(most)):
-            deck_at(row, frame, index, lanes)
-            for line in range(tables.shape[0]):
-                if mark_active(row, frame, line, index, lanes):
-                    newmark_predict(frame, tables[line], lanes)
-                    step_rope_and_load(row, frame, tables[line], index, lanes)
-                    newmark_correct(frame, tables[line], lanes)
-    for j in range(lanes):
-        row[at.OMEGA1 * lanes + j] += row[at.STEP_COST * lanes + j]
+def step_any_rope(row: Array, frame: Array, table: Array, index: int, span: Span) -> None:
+    """Do what ``step_rope_and_load`` does with ropes of either kind, lane by lane."""
+    lanes = span.stride
+    for j in range(span.begin, span.end):
+        if row[at.SPRINGS * lanes + j] == 0.0:
+            step_rope_and_load(row, frame, table, index, Span(lanes, j, j + 1))
+        elif frame[flex.ACTIVE * lanes + j] > 0.0:
+            step_heavy_rope(row, frame, table, index, Span(lanes, j, j + 1))
+
+
+@scalar
+def advance_deck_in_water(row: Array, frame: Array, components: int, records: Array, lanes: int) -> None:
+    """Advance the deck, the water's motion over the segment being found first."""
+    begin_water_at_node(row, Span(lanes, 0, lanes))
+    advance_deck(row, frame, components, records, lanes)
+
+
+def _step_of(
+    advance: Callable[[Array, Array, int, Array, int], None],
+    plan_winches: Callable[[Array, Span], None],
+    step_rope: Callable[[Array, Array, Array, int, Span], None],
+) -> Callable[..., None]:
+    """Control step of a block, by how a segment begins, winches are planned, and rope and load are stepped."""
+
+    @scalar
+    def control_step(
+        row: Array, frame: Array, tables: Array, components: int, segments: int, records: Array, lanes: int
+    ) -> None:
+        most = 0.0
+        for j in range(lanes):
+            row[at.STEP_COST * lanes + j] = 0.0
+            row[at.PEAK_TENSION * lanes + j] = 0.0
+            row[at.SLACK * lanes + j] = 0.0
+            row[at.CONTACT * lanes + j] = 0.0
+            most = row[at.SUBSTEPS * lanes + j] if row[at.SUBSTEPS * lanes + j] > most else most
+        for _ in range(segments):
+            advance(row, frame, components, records, lanes)
+            plan_winches(row, Span(lanes, 0, lanes))
+            for index in range(int(most)):
+                deck_at(row, frame, index, lanes)
+                for line in range(tables.shape[0]):
+                    if mark_active(row, frame, line, index, lanes):
+                        newmark_predict(frame, tables[line], lanes)
+                        step_rope(row, frame, tables[line], index, Span(lanes, 0, lanes))
+                        newmark_correct(frame, tables[line], lanes)
+        for j in range(lanes):
+            row[at.OMEGA1 * lanes + j] += row[at.STEP_COST * lanes + j]
+
+    return control_step
+
+
+# Control step of a block by ``segments`` motion segments, the command held: with the paper's rope alone, and with ropes
+# of either kind, which takes long to compile and gives the paper's rope the same bits.
+control_step = _step_of(advance_deck, plan_winch, step_rope_and_load)
+any_control_step = _step_of(advance_deck_in_water, plan_any, step_any_rope)
 
 
 class FlexibleKernels(NamedTuple):
@@ -175,17 +210,33 @@ class FlexibleKernels(NamedTuple):
 
 
 @cache
-def flexible_kernels(lanes: int = LANES) -> FlexibleKernels:
-    """Kernels for blocks of ``lanes`` rows (LANES for a batch, 1 for a single row)."""
+def flexible_kernels(lanes: int = LANES, heavy: bool = False) -> FlexibleKernels:
+    """Kernels for blocks of ``lanes`` rows (LANES for a batch, 1 for a single row).
 
-    @parallel_kernel
-    def step(blocks: Array, frames: Array, tables: Array, components: int, segments: int, records: Array) -> None:
-        for block in prange(blocks.shape[0]):
-            control_step(blocks[block], frames[block], tables, components, segments, records, lanes)
+    ``heavy``: for all that goes beyond the paper too.
+    """
+    # Functions of the module by name: numba's cache never finds a kernel again that closes over a compiled one.
+    if not heavy:
 
-    @kernel
-    def start(blocks: Array, frames: Array, tables: Array, comoving: float) -> None:
-        for block in range(blocks.shape[0]):
-            start_rows(blocks[block], frames[block], tables, comoving, lanes)
+        @parallel_kernel
+        def step(blocks: Array, frames: Array, tables: Array, components: int, segments: int, records: Array) -> None:
+            for block in prange(blocks.shape[0]):
+                control_step(blocks[block], frames[block], tables, components, segments, records, lanes)
+
+        @kernel
+        def start(blocks: Array, frames: Array, tables: Array, comoving: float) -> None:
+            for block in range(blocks.shape[0]):
+                start_rows(blocks[block], frames[block], tables, comoving, lanes)
+    else:
+
+        @parallel_kernel
+        def step(blocks: Array, frames: Array, tables: Array, components: int, segments: int, records: Array) -> None:
+            for block in prange(blocks.shape[0]):
+                any_control_step(blocks[block], frames[block], tables, components, segments, records, lanes)
+
+        @kernel
+        def start(blocks: Array, frames: Array, tables: Array, comoving: float) -> None:
+            for block in range(blocks.shape[0]):
+                start_heavy_rows(blocks[block], frames[block], tables, comoving, lanes)
 
     return FlexibleKernels(step.serial, step, start)
