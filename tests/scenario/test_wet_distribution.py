@@ -195,6 +195,12 @@ def test_what_does_not_go_together_is_one_sentence(changes, words) -> None:  # t
     assert "\n" not in str(raised.value)
 
 
-def test_models_of_light_ropes_refuse_it() -> None:
-    with pytest.raises(InvalidValue, match="take a rope without mass in air"):
-        TaskConfig(scenario=WET, model="rfem")
+def test_full_model_draws_from_it_too() -> None:
+    env = gymnasium.make_vec(
+        "AFrameHeave-v0", num_envs=3, scenario=WET, model="rfem", rfes=(5, 2), episode_duration=1.0
+    )
+    env.reset(seed=4)
+    for _ in range(10):
+        observation, reward, *_ = env.step(np.ones((3, 1), dtype=np.float32))
+        assert np.isfinite(observation).all()
+        assert (np.abs(reward) < 10.0).all()
