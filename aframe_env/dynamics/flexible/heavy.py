@@ -29,6 +29,7 @@ from aframe_env.dynamics.flexible.deck import deck_now
 from aframe_env.dynamics.flexible.rope import apply, apply_transposed, unit
 from aframe_env.dynamics.flexible.start import put_below, release, rest
 from aframe_env.dynamics.heavy_rope import lift_step, stage
+from aframe_env.dynamics.inner_step import drum_at, keep_figures, meet_bed
 from aframe_env.dynamics.layout import Span
 from aframe_env.dynamics.lift import (
     AXIS,
@@ -53,7 +54,6 @@ from aframe_env.dynamics.lift import (
     put_end,
 )
 from aframe_env.dynamics.load import RopeEnd
-from aframe_env.dynamics.step import drum_at, keep_figures, meet_bed
 from aframe_env.dynamics.target import move_target
 from aframe_env.dynamics.vector import Vector, add, along, cross, difference, inner, scaled
 from aframe_env.dynamics.winch import next_error

@@ -28,8 +28,9 @@ from aframe_env.dynamics.flexible.rope import (
     unit,
 )
 from aframe_env.dynamics.flexible.start import start_rows
+from aframe_env.dynamics.inner_step import drum_at, plan_winch
 from aframe_env.dynamics.layout import LANES, Span
-from aframe_env.dynamics.step import drum_at, plan_any, plan_winch
+from aframe_env.dynamics.step import plan_any
 from aframe_env.dynamics.vector import Vector, add, difference, scaled
 from aframe_env.dynamics.water import begin_water_at_node
 from aframe_env.dynamics.winch import next_error
