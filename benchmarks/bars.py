@@ -179,6 +179,13 @@ BARS: Final[tuple[Bar, ...]] = (
     Ratio(
         "an episode's steps, row of 4096 on one core", "dynamics/sea@1", ("solve_ivp/episode@1",), 500.0, "solve_ivp"
     ),
+    *(
+        Ratio(what, f"dynamics/deep-{name}@1", ("dynamics/deep-massless@1",), least, "a light rope in air")
+        for name, what, least in (
+            ("heavy", "rope of nine lumps at 1,000 m", 0.2),
+            ("everything", "everything on at 1,000 m", 0.125),
+        )
+    ),
     Limit("Ω1 over 36 s, alone", "drives/omega1-alone@1", 100.0),
     Limit("Ω1 over 36 s, each of 64 together", "drives/omega1-filled@1", 30.0),
     Limit("Ω1's relative error at this inner step", "drives/omega1-error@1", 1e-4),

@@ -78,6 +78,12 @@ def _speeds() -> Iterator[Measure]:
     yield Measure("env", "scalar", 1, ENVIRONMENTS, "env.step through gymnasium.make, resets included")
     yield Measure("env", "scalar-default", 1, ENVIRONMENTS, "the same, inner step as by default")
     yield Measure("dynamics", "one-row", 1, DYNAMICS, "Engine.step, 32 wave components, one row")
+    for name, what in (
+        ("massless", "light rope in air"),
+        ("heavy", "rope of nine lumps in still water"),
+        ("everything", "the same, and waves, current, seabed, limits of the winch, compensator, moving target"),
+    ):
+        yield Measure("dynamics", f"deep-{name}", 1, DYNAMICS, f"Engine.step, 1,000 m, 1,024 rows: {what}", slow=True)
     yield Measure("gymnasium", "pendulum", 1, GYMNASIUM, "Gymnasium Pendulum-v1 through gymnasium.make")
     yield Measure("gymnasium", "cartpole", 1, GYMNASIUM, "Gymnasium CartPole-v1 through gymnasium.make")
     yield Measure("gymnasium", "pendulum-vec-64", 1, GYMNASIUM, "Gymnasium Pendulum-v1, make_vec sync, 64 rows")
