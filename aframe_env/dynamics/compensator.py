@@ -15,7 +15,7 @@ import numpy.typing as npt
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.compiling import fma, scalar
 from aframe_env.dynamics.layout import Span
-from aframe_env.dynamics.lift import GIVEN_RATE, LENGTH, PAY_OUT, PULLEY_SPEED, SPEED, STROKE, advance_slot
+from aframe_env.dynamics.lift import GIVEN_RATE, LENGTH, PAY_OUT, SPEED, STROKE, advance_slot, aim
 
 Array = npt.NDArray[np.float64]
 
@@ -33,7 +33,7 @@ def slide_of(pay_out: float) -> float:
 def give(row: Array, source: int, target: int, end: int, fraction: float, weight: float, span: Span) -> None:
     """Let passive compensators give: rope is paid out as the tension on the drum's side overcomes gas and damper.
 
-    ``aim`` has been at the line from pulley to load before. At the ends of the stroke the cylinder stands.
+    At the ends of the stroke the cylinder stands.
     """
     lanes = span.stride
     for j in range(span.begin, span.end):
@@ -50,9 +50,12 @@ def give(row: Array, source: int, target: int, end: int, fraction: float, weight
                 loss_time = row[at.ROPE_DAMPING * lanes + j] * length / axial
             slide = row[at.SHEAVE_FRICTION * lanes + j] * slide_of(paid_out)
             stiffness = (1.0 - row[at.PARTED * lanes + j]) * axial / fma(slide, drum_part, top_length)
-            place = row[(source + springs - 1) * lanes + j] + row[at.DRUM_TO_PULLEY * lanes + j]
-            speed = row[(source + SPEED + springs - 1) * lanes + j]
-            speed -= row[(at.STAGE + PULLEY_SPEED) * lanes + j] + paid_out
+            line = aim(row, source, end, lanes, j)
+            place, speed = line.away, line.away_rate + line.pulley_speed
+            if springs > 1:
+                place, speed = row[(source + springs - 1) * lanes + j], row[(source + SPEED + springs - 1) * lanes + j]
+            place += row[at.DRUM_TO_PULLEY * lanes + j]
+            speed -= line.pulley_speed + paid_out
             # The tension at the drum as it would be with the cylinder held; the loss in the rope opposes its speed.
             held = (1.0 + slide) * stiffness * fma(loss_time, speed, place - top_length)
             held += (1.0 + slide) * row[at.HALF_WEIGHT * lanes + j]

@@ -20,194 +20,167 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.blocks import put_three, three
+from aframe_env.dynamics.blocks import put_three
 from aframe_env.dynamics.compensator import give, slide_of
 from aframe_env.dynamics.compiling import fma, larger, scalar, select, smaller
 from aframe_env.dynamics.layout import SPRINGS_MOST, Span
 from aframe_env.dynamics.lift import (
-    AWAY_RATE,
     AXIS,
     BELOW,
-    BOTTOM,
-    CARRIED,
     COST,
     ELEMENT,
-    END_VELOCITY,
     GIVEN_RATE,
     GROUND,
-    INVERSE_ELEMENT,
-    INVERSE_MASS,
-    LEAST,
     LENGTH,
     LEVER,
     LOAD_SHARE,
     MASS_LEVER,
-    MASS_LEVER_RATE,
     MASS_LEVER_SQUARED,
-    NEARNESS,
-    PAID_OUT,
-    PASSING,
     PAY_OUT,
     PEAK,
-    POSITION,
-    PULLEY_SPEED,
-    SINKING,
     SLACKEST,
     SLIDE,
-    SOFTNESS,
     SPEED,
-    STIFFNESS,
     STROKE,
-    TOP_LENGTH,
     TOP_LOSS,
     TOP_STIFFNESS,
-    TURN,
-    TURN_SQUARED,
-    VELOCITY,
+    Line,
+    Pull,
+    Rope,
     advance_slot,
+    aim,
 )
-from aframe_env.dynamics.vector import Vector, difference
 from aframe_env.dynamics.wet_load import pull_load
 
 Array = npt.NDArray[np.float64]
 
 
 @scalar
-def aim(row: Array, source: int, end: int, span: Span) -> None:
-    """Find the line from pulley to load, and its turning."""
-    lanes = span.stride
-    for j in range(span.begin, span.end):
-        position, velocity = three(row, source + POSITION, lanes, j), three(row, source + VELOCITY, lanes, j)
-        pulley_rate = three(row, end + END_VELOCITY, lanes, j)
-        u = difference(position, three(row, end, lanes, j))
-        du = difference(velocity, pulley_rate)
-        # A load at the very pulley has no rope direction; 1 nm stands in for it.
-        away = math.sqrt(fma(u.x, u.x, fma(u.y, u.y, fma(u.z, u.z, 1e-18))))
-        nearness = 1.0 / away
-        axis = Vector(u.x * nearness, u.y * nearness, u.z * nearness)
-        away_rate = fma(axis.x, du.x, fma(axis.y, du.y, axis.z * du.z))
-        turn = Vector(
-            fma(-away_rate, axis.x, du.x) * nearness,
-            fma(-away_rate, axis.y, du.y) * nearness,
-            fma(-away_rate, axis.z, du.z) * nearness,
-        )
-        speed = fma(axis.x, pulley_rate.x, fma(axis.y, pulley_rate.y, axis.z * pulley_rate.z))
-        row[source * lanes + j] = away
-        row[(source + SPEED) * lanes + j] = away_rate + speed
-        put_three(row, at.STAGE + AXIS, lanes, j, axis)
-        put_three(row, at.STAGE + TURN, lanes, j, turn)
-        row[(at.STAGE + AWAY_RATE) * lanes + j] = away_rate
-        row[(at.STAGE + NEARNESS) * lanes + j] = nearness
-        row[(at.STAGE + PULLEY_SPEED) * lanes + j] = speed
-        row[(at.STAGE + CARRIED) * lanes + j] = fma(
-            turn.x, pulley_rate.x, fma(turn.y, pulley_rate.y, turn.z * pulley_rate.z)
-        )
-        row[(at.STAGE + TURN_SQUARED) * lanes + j] = fma(turn.x, turn.x, fma(turn.y, turn.y, turn.z * turn.z))
-
-
-@scalar
-def divide(row: Array, source: int, end: int, span: Span) -> None:
+def divide(row: Array, source: int, end: int, lanes: int, j: int) -> Rope:
     """Find what all springs of the rope have in common."""
-    lanes = span.stride
-    for j in range(span.begin, span.end):
-        # What a compensator gives is paid out as the drum's rope is.
-        length = row[(end + LENGTH) * lanes + j] + row[(source + STROKE) * lanes + j]
-        pay_out = row[(end + PAY_OUT) * lanes + j] + row[(at.STAGE + GIVEN_RATE) * lanes + j]
-        lumps, axial = row[at.SPRINGS * lanes + j] - 1.0, row[at.AXIAL_STIFFNESS * lanes + j]
-        bare = lumps <= 0.0
-        share = 1.0 / select(bare, 1.0, lumps)
-        element = (length - row[at.DRUM_PART * lanes + j]) * share
-        inverse = 1.0 / element
-        top_length = select(bare, length, fma(0.5, element, row[at.DRUM_PART * lanes + j]))
-        intact = 1.0 - row[at.PARTED * lanes + j]
-        mass = select(bare, 1.0, row[at.ROPE_MASS * lanes + j] * element)
-        row[(at.STAGE + ELEMENT) * lanes + j] = element
-        row[(at.STAGE + INVERSE_ELEMENT) * lanes + j] = inverse
-        row[(at.STAGE + STIFFNESS) * lanes + j] = axial * inverse
-        row[(at.STAGE + TOP_LENGTH) * lanes + j] = top_length
-        slide = row[at.SHEAVE_FRICTION * lanes + j] * slide_of(row[(end + PAY_OUT) * lanes + j])
-        row[(at.STAGE + SLIDE) * lanes + j] = 1.0 + slide
-        row[(at.STAGE + TOP_STIFFNESS) * lanes + j] = (
-            intact * axial / fma(slide, row[at.DRUM_PART * lanes + j], top_length)
-        )
-        # A single spring has the constant damping of eq. (26), the elements of a chain their material's.
-        constant = row[at.ROPE_DAMPING * lanes + j] * top_length / axial
-        row[(at.STAGE + TOP_LOSS) * lanes + j] = select(bare, constant, row[at.LOSS_TIME * lanes + j])
-        row[(at.STAGE + PAID_OUT) * lanes + j] = pay_out
-        row[(at.STAGE + PASSING) * lanes + j] = pay_out * share
-        row[(at.STAGE + INVERSE_MASS) * lanes + j] = 1.0 / mass
-        row[(at.STAGE + SOFTNESS) * lanes + j] = 1.0 / axial
-        row[(at.STAGE + SINKING) * lanes + j] = -row[(at.STAGE + AXIS + 2) * lanes + j]
-        row[(at.STAGE + LEAST) * lanes + j] = math.inf
-        row[(at.STAGE + LEVER) * lanes + j] = 0.0
-        row[(at.STAGE + MASS_LEVER) * lanes + j] = 0.0
-        row[(at.STAGE + MASS_LEVER_SQUARED) * lanes + j] = 0.0
-        row[(at.STAGE + MASS_LEVER_RATE) * lanes + j] = 0.0
+    # What a compensator gives is paid out as the drum's rope is.
+    length = row[(end + LENGTH) * lanes + j] + row[(source + STROKE) * lanes + j]
+    pay_out = row[(end + PAY_OUT) * lanes + j] + row[(at.STAGE + GIVEN_RATE) * lanes + j]
+    springs, axial = row[at.SPRINGS * lanes + j], row[at.AXIAL_STIFFNESS * lanes + j]
+    drum_part, loss_time = row[at.DRUM_PART * lanes + j], row[at.LOSS_TIME * lanes + j]
+    lumps = springs - 1.0
+    bare = lumps <= 0.0
+    share = 1.0 / select(bare, 1.0, lumps)
+    element = (length - drum_part) * share
+    inverse = 1.0 / element
+    top_length = select(bare, length, fma(0.5, element, drum_part))
+    intact = 1.0 - row[at.PARTED * lanes + j]
+    mass = select(bare, 1.0, row[at.ROPE_MASS * lanes + j] * element)
+    slide = row[at.SHEAVE_FRICTION * lanes + j] * slide_of(row[(end + PAY_OUT) * lanes + j])
+    # A single spring has the constant damping of eq. (26), the elements of a chain their material's.
+    constant = row[at.ROPE_DAMPING * lanes + j] * top_length / axial
+    return Rope(
+        springs,
+        element,
+        inverse,
+        axial * inverse,
+        loss_time,
+        top_length,
+        intact * axial / fma(slide, drum_part, top_length),
+        select(bare, constant, loss_time),
+        -row[at.DRUM_TO_PULLEY * lanes + j],
+        pay_out,
+        pay_out * share,
+        1.0 / mass,
+        1.0 / axial,
+        row[at.ROPE_WEIGHT * lanes + j],
+        row[at.ROPE_DRAG * lanes + j],
+        1.0 + slide,
+    )
 
 
 @scalar
-def spring(row: Array, i: int, source: int, target: int, fraction: float, weight: float, span: Span) -> None:
+def grip(row: Array, source: int, line: Line) -> Pull:
+    """What the load's end of the rope tells its lowest spring."""
+    return Pull(line.away, line.away_rate + line.pulley_speed, 0.0, 0.0, 0.0, math.inf, 0.0, 0.0, 0.0, 0.0)
+
+
+@scalar
+def spring(
+    row: Array,
+    i: int,
+    source: int,
+    target: int,
+    fraction: float,
+    weight: float,
+    lanes: int,
+    j: int,
+    line: Line,
+    rope: Rope,
+    below: Pull,
+) -> Pull:
     """Pull with spring i of the rope, from its load's end, and move the lump at its lower end (not the load)."""
-    lanes = span.stride
     half = 0.5 if i == 0 else 1.0
     # Strain and speed change within a spring; at a lump each of its two springs counts by the other's length.
     upper_share = 1.0 / 3.0 if i == 1 else 0.5
     top_share = 0.5 if i == 1 else 2.0 / 3.0
-    for j in range(span.begin, span.end):
-        springs = row[at.SPRINGS * lanes + j]
-        inside, top = springs > i, springs == i + 1
-        place, speed = row[(source + i) * lanes + j], row[(source + SPEED + i) * lanes + j]
-        pulley_speed = row[(at.STAGE + PULLEY_SPEED) * lanes + j]
-        paid_out = row[(at.STAGE + PAID_OUT) * lanes + j]
-        upper = select(top, -row[at.DRUM_TO_PULLEY * lanes + j], row[(source + i + 1) * lanes + j])
-        upper_speed = select(top, pulley_speed + paid_out, row[(source + SPEED + i + 1) * lanes + j])
-        element = row[(at.STAGE + ELEMENT) * lanes + j]
-        stiffness = select(
-            top, row[(at.STAGE + TOP_STIFFNESS) * lanes + j], row[(at.STAGE + STIFFNESS) * lanes + j] / half
-        )
-        elongation = place - upper - select(top, row[(at.STAGE + TOP_LENGTH) * lanes + j], half * element)
-        loss_time = select(top, row[(at.STAGE + TOP_LOSS) * lanes + j], row[at.LOSS_TIME * lanes + j])
-        tension = larger(stiffness * fma(loss_time, speed - upper_speed, elongation), 0.0)
-        below = row[(at.STAGE + BELOW) * lanes + j]
-        row[(at.STAGE + BELOW) * lanes + j] = select(inside, tension, below)
-        least = row[(at.STAGE + LEAST) * lanes + j]
-        row[(at.STAGE + LEAST) * lanes + j] = smaller(least, select(inside, tension, least))
-        if i == 0:
-            row[(at.STAGE + BOTTOM) * lanes + j] = tension
-        else:
-            softness = row[(at.STAGE + SOFTNESS) * lanes + j]
-            inverse = row[(at.STAGE + INVERSE_ELEMENT) * lanes + j]
-            # Where the pulley is, the rope goes down with it and with what is paid out.
-            upper_speed = fma(select(top, softness * tension, 0.0), paid_out, upper_speed)
-            share = select(top, top_share, upper_share)
-            strain = softness * fma(share, tension - below, below)
-            lower_slope = (speed - row[(source + SPEED + i - 1) * lanes + j]) * inverse * (2.0 if i == 1 else 1.0)
-            upper_slope = (upper_speed - speed) * inverse * select(top, 2.0, 1.0)
-            slope = fma(share, upper_slope - lower_slope, lower_slope)
-            passing = (i - 0.5) * row[(at.STAGE + PASSING) * lanes + j]
-            lumps = springs - 1.0
-            # What the load carries for the lowest lump; so the sum of mass times place stays as it is.
-            mass = fma(-2.0 * LOAD_SHARE, lumps / fma(2.0, lumps, -1.0), 1.0) if i == 1 else 1.0
-            own = fma(
-                row[at.ROPE_WEIGHT * lanes + j],
-                row[(at.STAGE + SINKING) * lanes + j],
-                -row[at.ROPE_DRAG * lanes + j] * abs(speed) * speed,
-            )
-            acceleration = row[(at.STAGE + INVERSE_MASS) * lanes + j] * fma(element, own, below - tension)
-            if i == 1:
-                acceleration /= mass
-            turning = fma(place, row[(at.STAGE + TURN_SQUARED) * lanes + j], row[(at.STAGE + CARRIED) * lanes + j])
-            own_rate = speed - pulley_speed
-            lever = select(inside, place * row[(at.STAGE + NEARNESS) * lanes + j], 0.0)
-            lever_rate = fma(-lever, row[(at.STAGE + AWAY_RATE) * lanes + j], own_rate)
-            row[(at.STAGE + LEVER) * lanes + j] += lever
-            row[(at.STAGE + MASS_LEVER) * lanes + j] += mass * lever
-            row[(at.STAGE + MASS_LEVER_SQUARED) * lanes + j] += mass * lever * lever
-            row[(at.STAGE + MASS_LEVER_RATE) * lanes + j] += mass * lever * lever_rate
-            place_rate = select(inside, fma(-passing, 1.0 + strain, own_rate), 0.0)
-            speed_rate = select(inside, fma(slope, passing, acceleration + turning), 0.0)
-            advance_slot(row, i, place_rate, source, target, fraction, weight, lanes, j)
-            advance_slot(row, SPEED + i, speed_rate, source, target, fraction, weight, lanes, j)
+    inside, top = rope.springs > i, rope.springs == i + 1
+    place, speed = below.place, below.speed
+    next_place, next_speed = row[(source + i + 1) * lanes + j], row[(source + SPEED + i + 1) * lanes + j]
+    upper = select(top, rope.drum, next_place)
+    upper_speed = select(top, line.pulley_speed + rope.paid_out, next_speed)
+    stiffness = select(top, rope.top_stiffness, rope.stiffness / half)
+    elongation = place - upper - select(top, rope.top_length, half * rope.element)
+    loss_time = select(top, rope.top_loss, rope.loss_time)
+    tension = larger(stiffness * fma(loss_time, speed - upper_speed, elongation), 0.0)
+    highest = select(inside, tension, below.tension)
+    least = smaller(below.least, select(inside, tension, below.least))
+    if i == 0:
+        return Pull(next_place, next_speed, speed, highest, tension, least, 0.0, 0.0, 0.0, 0.0)
+    # Where the pulley is, the rope goes down with it and with what is paid out.
+    upper_speed = fma(select(top, rope.softness * tension, 0.0), rope.paid_out, upper_speed)
+    share = select(top, top_share, upper_share)
+    strain = rope.softness * fma(share, tension - below.tension, below.tension)
+    lower_slope = (speed - below.speed_below) * rope.inverse * (2.0 if i == 1 else 1.0)
+    upper_slope = (upper_speed - speed) * rope.inverse * select(top, 2.0, 1.0)
+    slope = fma(share, upper_slope - lower_slope, lower_slope)
+    passing = (i - 0.5) * rope.passing
+    lumps = rope.springs - 1.0
+    # What the load carries for the lowest lump; so the sum of mass times place stays as it is.
+    mass = fma(-2.0 * LOAD_SHARE, lumps / fma(2.0, lumps, -1.0), 1.0) if i == 1 else 1.0
+    own = fma(rope.weight, -line.axis.z, -rope.drag * abs(speed) * speed)
+    acceleration = rope.inverse_mass * fma(rope.element, own, below.tension - tension)
+    if i == 1:
+        acceleration /= mass
+    turning = fma(place, line.turn_squared, line.carried)
+    own_rate = speed - line.pulley_speed
+    lever = select(inside, place * line.nearness, 0.0)
+    lever_rate = fma(-lever, line.away_rate, own_rate)
+    place_rate = select(inside, fma(-passing, 1.0 + strain, own_rate), 0.0)
+    speed_rate = select(inside, fma(slope, passing, acceleration + turning), 0.0)
+    advance_slot(row, i, place_rate, source, target, fraction, weight, lanes, j)
+    advance_slot(row, SPEED + i, speed_rate, source, target, fraction, weight, lanes, j)
+    return Pull(
+        next_place,
+        next_speed,
+        speed,
+        highest,
+        below.bottom,
+        least,
+        below.lever + lever,
+        below.mass_lever + mass * lever,
+        below.mass_lever_squared + mass * lever * lever,
+        below.mass_lever_rate + mass * lever * lever_rate,
+    )
+
+
+@scalar
+def tell(row: Array, lanes: int, j: int, line: Line, rope: Rope, pull: Pull) -> None:
+    """Write what the full model asks of a stage."""
+    put_three(row, at.STAGE + AXIS, lanes, j, line.axis)
+    row[(at.STAGE + ELEMENT) * lanes + j] = rope.element
+    row[(at.STAGE + TOP_STIFFNESS) * lanes + j] = rope.top_stiffness
+    row[(at.STAGE + TOP_LOSS) * lanes + j] = rope.top_loss
+    row[(at.STAGE + SLIDE) * lanes + j] = rope.slide
+    row[(at.STAGE + BELOW) * lanes + j] = pull.tension
+    row[(at.STAGE + LEVER) * lanes + j] = pull.lever
+    row[(at.STAGE + MASS_LEVER) * lanes + j] = pull.mass_lever
+    row[(at.STAGE + MASS_LEVER_SQUARED) * lanes + j] = pull.mass_lever_squared
 
 
 @scalar
@@ -219,39 +192,60 @@ def stage(
     fraction: float,
     weight: float,
     most: int,
-    unrolled: bool,
     span: Span,
 ) -> None:
     """Make one stage of the Runge-Kutta scheme: from the rates at ``source`` to the state at ``target``.
 
-    ``unrolled``: springs by constant numbers, which the compiler vectorises over the lanes but takes long to compile.
+    Springs go by a loop within each lane, which is quick to compile.
     """
-    aim(row, source, end, span)
+    lanes = span.stride
     give(row, source, target, end, fraction, weight, span)
-    divide(row, source, end, span)
-    if unrolled:
-        spring(row, 0, source, target, fraction, weight, span)
-        if most > 1:
-            spring(row, 1, source, target, fraction, weight, span)
-            spring(row, 2, source, target, fraction, weight, span)
-            spring(row, 3, source, target, fraction, weight, span)
-            spring(row, 4, source, target, fraction, weight, span)
-            spring(row, 5, source, target, fraction, weight, span)
-            spring(row, 6, source, target, fraction, weight, span)
-        if most > 7:
-            spring(row, 7, source, target, fraction, weight, span)
-        if most > 8:
-            spring(row, 8, source, target, fraction, weight, span)
-            spring(row, 9, source, target, fraction, weight, span)
-    else:
+    for j in range(span.begin, span.end):
+        line, rope = aim(row, source, end, lanes, j), divide(row, source, end, lanes, j)
+        pull = grip(row, source, line)
         for i in range(most):
-            spring(row, i, source, target, fraction, weight, span)
-    pull_load(row, source, target, end, fraction, weight, span)
+            pull = spring(row, i, source, target, fraction, weight, lanes, j, line, rope, pull)
+        tell(row, lanes, j, line, rope, pull)
+        pull_load(row, source, target, end, fraction, weight, lanes, j, line, rope, pull)
 
 
 @scalar
-def lift_step(row: Array, most: int, unrolled: bool, span: Span) -> None:
-    """Make one Runge-Kutta step of STEP_LENGTH with ropes of up to ``most`` springs, whose ends are in ENDS."""
+def wide_stage(
+    row: Array, source: int, target: int, end: int, fraction: float, weight: float, most: int, span: Span
+) -> None:
+    """Do what ``stage`` does with springs by constant numbers: vectorised over the lanes, it takes long to compile.
+
+    A spring beyond a rope's top does nothing; most ropes are chains of nine lumps or single springs.
+    """
+    lanes, s, t, f, w = span.stride, source, target, fraction, weight
+    give(row, source, target, end, fraction, weight, span)
+    if most == 1:
+        for j in range(span.begin, span.end):
+            line, rope = aim(row, source, end, lanes, j), divide(row, source, end, lanes, j)
+            pull = spring(row, 0, s, t, f, w, lanes, j, line, rope, grip(row, source, line))
+            pull_load(row, source, target, end, fraction, weight, lanes, j, line, rope, pull)
+    else:
+        for j in range(span.begin, span.end):
+            line, rope = aim(row, source, end, lanes, j), divide(row, source, end, lanes, j)
+            pull = spring(row, 0, s, t, f, w, lanes, j, line, rope, grip(row, source, line))
+            pull = spring(row, 1, s, t, f, w, lanes, j, line, rope, pull)
+            pull = spring(row, 2, s, t, f, w, lanes, j, line, rope, pull)
+            pull = spring(row, 3, s, t, f, w, lanes, j, line, rope, pull)
+            pull = spring(row, 4, s, t, f, w, lanes, j, line, rope, pull)
+            pull = spring(row, 5, s, t, f, w, lanes, j, line, rope, pull)
+            pull = spring(row, 6, s, t, f, w, lanes, j, line, rope, pull)
+            pull = spring(row, 7, s, t, f, w, lanes, j, line, rope, pull)
+            pull = spring(row, 8, s, t, f, w, lanes, j, line, rope, pull)
+            pull = spring(row, 9, s, t, f, w, lanes, j, line, rope, pull)
+            pull_load(row, source, target, end, fraction, weight, lanes, j, line, rope, pull)
+
+
+@scalar
+def lift_step(row: Array, most: int, wide: bool, span: Span) -> None:
+    """Make one Runge-Kutta step of STEP_LENGTH with ropes of up to ``most`` springs, whose ends are in ENDS.
+
+    ``wide``: all lanes of a block side by side.
+    """
     lanes = span.stride
     for j in range(span.begin, span.end):
         row[(at.STAGE + PEAK) * lanes + j] = 0.0
@@ -259,18 +253,18 @@ def lift_step(row: Array, most: int, unrolled: bool, span: Span) -> None:
         row[(at.STAGE + COST) * lanes + j] = 0.0
         row[(at.STAGE + GROUND) * lanes + j] = 0.0
     start, middle, end = at.ENDS, at.ENDS + at.END_SIZE, at.ENDS + 2 * at.END_SIZE
-    if unrolled:
-        stage(row, at.LIFT, at.LIFT_A, start, 0.5, 1.0, most, unrolled, span)
-        stage(row, at.LIFT_A, at.LIFT_B, middle, 0.5, 2.0, most, unrolled, span)
-        stage(row, at.LIFT_B, at.LIFT_A, middle, 1.0, 2.0, most, unrolled, span)
-        stage(row, at.LIFT_A, at.LIFT, end, 1.0, 1.0, most, unrolled, span)
+    if wide:
+        wide_stage(row, at.LIFT, at.LIFT_A, start, 0.5, 1.0, most, span)
+        wide_stage(row, at.LIFT_A, at.LIFT_B, middle, 0.5, 2.0, most, span)
+        wide_stage(row, at.LIFT_B, at.LIFT_A, middle, 1.0, 2.0, most, span)
+        wide_stage(row, at.LIFT_A, at.LIFT, end, 1.0, 1.0, most, span)
     else:
         for k in range(4):
             source = at.LIFT if k == 0 else (at.LIFT_B if k == 2 else at.LIFT_A)
             target = at.LIFT if k == 3 else (at.LIFT_B if k == 1 else at.LIFT_A)
             upper = start if k == 0 else (end if k == 3 else middle)
             fraction = 0.5 if k < 2 else 1.0
-            stage(row, source, target, upper, fraction, 2.0 if k == 1 or k == 2 else 1.0, most, unrolled, span)
+            stage(row, source, target, upper, fraction, 2.0 if k == 1 or k == 2 else 1.0, most, span)
 
 
 @scalar

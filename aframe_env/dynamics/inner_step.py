@@ -172,7 +172,7 @@ def meet_bed(row: Array, span: Span) -> None:
 
 
 @scalar
-def heavy_inner_step(row: Array, index: int, most: int, unrolled: bool, span: Span) -> None:
+def heavy_inner_step(row: Array, index: int, most: int, wide: bool, span: Span) -> None:
     """Make inner step ``index`` in lanes whose ropes have mass or whose loads are in water, as ``inner_step`` does."""
     lanes = span.stride
     for j in range(span.begin, span.end):
@@ -187,7 +187,7 @@ def heavy_inner_step(row: Array, index: int, most: int, unrolled: bool, span: Sp
         row[at.STEP_LENGTH * lanes + j] = select(active, full, 0.0)
         row[at.MOMENT * lanes + j] = place + 0.5 * full - since_node
     move_target(row, span)
-    lift_step(row, most, unrolled, span)
+    lift_step(row, most, wide, span)
     meet_bed(row, span)
     for j in range(span.begin, span.end):
         step = row[at.STEP_LENGTH * lanes + j]
@@ -211,7 +211,7 @@ def measure_heavy(row: Array, most: int, span: Span) -> None:
         row[(at.STAGE + SLACKEST) * lanes + j] = 1.0
         # What the water does has been followed to the middle of the last inner step; it goes on to its end.
         row[at.MOMENT * lanes + j] = select(row[at.MOMENT * lanes + j] > 0.0, row[at.CONTROL_PERIOD * lanes + j], 0.0)
-    stage(row, at.LIFT, at.LIFT_A, at.ENDS, 0.5, 1.0, most, False, span)
+    stage(row, at.LIFT, at.LIFT_A, at.ENDS, 0.5, 1.0, most, span)
     for j in range(span.begin, span.end):
         slack = row[(at.STAGE + SLACKEST) * lanes + j] <= 0.0
         row[at.SLACK * lanes + j] = 1.0 if slack else row[at.SLACK * lanes + j]

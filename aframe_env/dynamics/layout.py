@@ -234,8 +234,8 @@ MOMENT: Final = _take(1)
 """Time since the start of the segment at which the water about the load is taken, s."""
 PUSH: Final = _take(6)
 """What the drag of water across the rope hands on to the load over a segment, and to the pulley, N."""
-STAGE: Final = _take(35)
-"""What the parts of a stage tell each other, see ``heavy_rope``."""
+STAGE: Final = _take(16)
+"""What is kept of the stages of an inner step, see ``lift``."""
 
 ROW_SLOTS: Final = _next()
 

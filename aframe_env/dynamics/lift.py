@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Final
+import math
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
-from aframe_env.dynamics.blocks import put_three
+from aframe_env.dynamics.blocks import put_three, three
 from aframe_env.dynamics.compiling import fma, scalar
 from aframe_env.dynamics.layout import SPRINGS_MOST
 from aframe_env.dynamics.load import RopeEnd
-from aframe_env.dynamics.vector import Vector
+from aframe_env.dynamics.vector import Vector, difference
 
 Array = npt.NDArray[np.float64]
 
@@ -29,44 +30,96 @@ LENGTH: Final = 9
 PAY_OUT: Final = 10
 END_TARGET: Final = 11
 
-# Places in STAGE.
+# Places in STAGE: what is summed up over an inner step, and what the full model asks of a stage.
 (
-    AXIS,
-    _,
-    _,
-    TURN,
-    _,
-    _,
-    AWAY_RATE,
-    NEARNESS,
-    PULLEY_SPEED,
-    CARRIED,
-    TURN_SQUARED,
-    SINKING,
-    ELEMENT,
-    INVERSE_ELEMENT,
-    STIFFNESS,
-    TOP_LENGTH,
-    TOP_STIFFNESS,
-    TOP_LOSS,
-    PAID_OUT,
-    PASSING,
-    INVERSE_MASS,
-    SOFTNESS,
-    BELOW,
-    BOTTOM,
-    LEAST,
-    LEVER,
-    MASS_LEVER,
-    MASS_LEVER_SQUARED,
-    MASS_LEVER_RATE,
     PEAK,
     SLACKEST,
     COST,
-    SLIDE,
-    GIVEN_RATE,
     GROUND,
-) = range(35)
+    GIVEN_RATE,
+    AXIS,
+    _,
+    _,
+    ELEMENT,
+    TOP_STIFFNESS,
+    TOP_LOSS,
+    SLIDE,
+    BELOW,
+    LEVER,
+    MASS_LEVER,
+    MASS_LEVER_SQUARED,
+) = range(16)
+
+
+class Line(NamedTuple):
+    """The line from pulley to load in a stage."""
+
+    axis: Vector
+    turn: Vector
+    """Rate of the axis, 1/s."""
+    away: float
+    """Its length, m."""
+    away_rate: float
+    nearness: float
+    """1 / ``away``."""
+    pulley_speed: float
+    """Speed of the pulley along it, downwards, m/s."""
+    carried: float
+    """Product of the pulley's velocity and ``turn``, m/s²."""
+    turn_squared: float
+
+
+class Rope(NamedTuple):
+    """What the springs of a rope have in common in a stage."""
+
+    springs: float
+    element: float
+    """Unstretched length of an element, m."""
+    inverse: float
+    """1 / ``element``."""
+    stiffness: float
+    """Of an element, N/m."""
+    loss_time: float
+    top_length: float
+    """Unstretched length of the uppermost spring, to the drum, m."""
+    top_stiffness: float
+    top_loss: float
+    drum: float
+    """Place of the drum along the line, the pulley being at 0: above it, m."""
+    paid_out: float
+    """Rate of the rope's unstretched length, m/s."""
+    passing: float
+    """The same for an element."""
+    inverse_mass: float
+    """1 / the mass of an element, 1/kg."""
+    softness: float
+    """1 / E F, 1/N."""
+    weight: float
+    """N/m."""
+    drag: float
+    slide: float
+    """Tension on the drum's side of the pulley over that on the load's."""
+
+
+class Pull(NamedTuple):
+    """What a spring tells the one above it, and the sums over the springs so far."""
+
+    place: float
+    """Place of the lump above it along the line, m below the pulley."""
+    speed: float
+    speed_below: float
+    """Speed of the lump below that, m/s."""
+    tension: float
+    bottom: float
+    """Tension of the lowest spring, N."""
+    least: float
+    """Least tension so far, N."""
+    lever: float
+    """Sum of the lumps' levers about the pulley, shares of the line."""
+    mass_lever: float
+    mass_lever_squared: float
+    mass_lever_rate: float
+
 
 LOAD_SHARE: Final = 1.0 / 6.0
 """Share of an element's mass that the load carries for the lowest lump."""
@@ -103,3 +156,26 @@ def advance_slot(
     else:
         row[(at.LIFT_SUM + slot) * lanes + j] = fma(weight, rate, row[(at.LIFT_SUM + slot) * lanes + j])
         row[(target + slot) * lanes + j] = fma(fraction * h, rate, state)
+
+
+@scalar
+def aim(row: Array, source: int, end: int, lanes: int, j: int) -> Line:
+    """Find the line from pulley to load, and its turning."""
+    position, velocity = three(row, source + POSITION, lanes, j), three(row, source + VELOCITY, lanes, j)
+    pulley_rate = three(row, end + END_VELOCITY, lanes, j)
+    u = difference(position, three(row, end, lanes, j))
+    du = difference(velocity, pulley_rate)
+    # A load at the very pulley has no rope direction; 1 nm stands in for it.
+    away = math.sqrt(fma(u.x, u.x, fma(u.y, u.y, fma(u.z, u.z, 1e-18))))
+    nearness = 1.0 / away
+    axis = Vector(u.x * nearness, u.y * nearness, u.z * nearness)
+    away_rate = fma(axis.x, du.x, fma(axis.y, du.y, axis.z * du.z))
+    turn = Vector(
+        fma(-away_rate, axis.x, du.x) * nearness,
+        fma(-away_rate, axis.y, du.y) * nearness,
+        fma(-away_rate, axis.z, du.z) * nearness,
+    )
+    speed = fma(axis.x, pulley_rate.x, fma(axis.y, pulley_rate.y, axis.z * pulley_rate.z))
+    carried = fma(turn.x, pulley_rate.x, fma(turn.y, pulley_rate.y, turn.z * pulley_rate.z))
+    squared = fma(turn.x, turn.x, fma(turn.y, turn.y, turn.z * turn.z))
+    return Line(axis, turn, away, away_rate, nearness, speed, carried, squared)

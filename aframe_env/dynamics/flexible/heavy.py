@@ -207,7 +207,7 @@ def step_heavy_rope(row: Array, frame: Array, table: Array, index: int, span: Sp
         put_middle(row, drum, h, lanes, j)
         move_target(row, span)
         lift_step(row, springs, False, span)
-        stage(row, at.LIFT, at.LIFT_A, END, 0.5, 0.0, springs, False, span)
+        stage(row, at.LIFT, at.LIFT_A, END, 0.5, 0.0, springs, span)
         force = head_force(row, frame, table, shift, force, lanes, j)
     # The lumps stay where they are while S gives way to the last pass's force.
     given = difference(add(tip, apply(give, force)), shift)
@@ -299,7 +299,7 @@ def measure(row: Array, frame: Array, deflection: Vector, span: Span) -> None:
     put_head(row, frame, deflection, Vector(0.0, 0.0, 0.0), RopeOut(row[at.FREE_LENGTH * lanes + j], 0.0), lanes, j)
     row[at.STEP_LENGTH * lanes + j] = 0.0
     row[(at.STAGE + SLACKEST) * lanes + j] = 1.0
-    stage(row, at.LIFT, at.LIFT_A, END, 0.5, 0.0, springs, False, span)
+    stage(row, at.LIFT, at.LIFT_A, END, 0.5, 0.0, springs, span)
     tension = row[at.TENSION * lanes + j]
     across = apply_transposed(nine(frame, flex.ROTATION, lanes, j), handed_up(row, lanes, j))
     put_three(frame, flex.PULL, lanes, j, along(across, tension, directions(row, frame, deflection, 1.0, lanes, j)))
