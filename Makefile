@@ -5,13 +5,14 @@ BIN := .venv/bin
 
 .DEFAULT_GOAL := help
 
-.PHONY: help train demo docs drives test verify results bench torture compat check clean
+.PHONY: help train demo docs drives test test-all verify results bench torture compat check clean
 
 help:
 	@echo "make train     learn to hold the load still and compare the agent (some five minutes)"
 	@echo "make demo      watch a lift in the browser, live"
 	@echo "make docs      build the documentation site, build/site/index.html"
-	@echo "make test      run the whole suite (some ten minutes)"
+	@echo "make test      run the suite but for what is marked slow (some ten minutes on two cores)"
+	@echo "make test-all  run all of it: whole trainings, kills, tutorials (some half an hour)"
 	@echo "make check     lint, format, layers, types"
 	@echo "make torture   kill trainings, fill disks, and count what is lost (some ten minutes)"
 	@echo "make drives | verify | results | bench | compat | clean"
@@ -55,6 +56,9 @@ results: .venv/installed-test
 	$(BIN)/python -m train.verify --water --overwrite --folder results/verification/water
 
 test: .venv/installed-test
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow" $(ARGS)
+
+test-all: .venv/installed-test
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
 check: .venv/installed-test

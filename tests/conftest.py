@@ -16,6 +16,11 @@ from typing import Any
 
 import pytest
 
+# Pytest's workers share the cores, and on busy cores threads that wait for one another take ten times as long as one.
+# Before numpy, numba and torch are imported, which look once; what needs two threads says so to a process of its own.
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 FLAGS = ("--no-first-run", "--disable-background-networking", "--disable-component-update")
 

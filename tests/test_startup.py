@@ -85,6 +85,24 @@ def test_compiling_is_announced_once_and_a_warm_start_is_silent(tmp_path: Path) 
     assert run(SMALL, NUMBA_CACHE_DIR=tmp_path) == (cold, "")
 
 
+def test_a_second_process_compiles_no_step_anew(tmp_path: Path) -> None:
+    """What is in the cache must not depend on the process: its kernels' names and their keys are the same in all."""
+    code = """
+import gymnasium, numpy
+env = gymnasium.make("aframe_env:AFrameHeave-v0")
+env.reset(seed=0)
+print(env.step(numpy.zeros(1, dtype=numpy.float32))[0].tolist())
+"""
+    # Less optimised, it compiles sooner, and is kept the same way.
+    how = {"NUMBA_CACHE_DIR": tmp_path, "NUMBA_OPT": "1"}
+    cold, announced = run(code, **how)
+    assert MESSAGE in announced
+    kept = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nb?")}
+    assert any("step_kernels" in path.name for path in kept)
+    assert run(code, **how) == (cold, "")
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nb?")} == kept
+
+
 def test_others_functions_are_not_announced(tmp_path: Path) -> None:
     code = "import aframe_env.dynamics.compiling, numba; print(numba.njit(lambda x: x + 1)(1))"
     assert run(code, NUMBA_CACHE_DIR=tmp_path) == ("2\n", "")

@@ -12,6 +12,7 @@ import os
 import re
 import sys
 import tempfile
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
@@ -22,6 +23,7 @@ TOLERANCE: Final = 2
 """Units in its last printed digit by which a number may differ from the page's."""
 
 _CELL: Final = re.compile(r"^# %%(.*)\n", re.MULTILINE)
+_PRINTED: Final = re.compile(r"^```text\n.*?^```\n\n?", re.MULTILINE | re.DOTALL)
 _NUMBER: Final = re.compile(r"(?<![\w.])-?\d[\d,]*(?:\.\d+)?")
 
 
@@ -32,25 +34,40 @@ def page_of(script: Path) -> Path:
 
 def run(script: Path, folder: Path) -> str:
     """Run a script in a folder, cell by cell; return its page."""
+    variables: dict[str, Any] = {"__name__": "__main__", "__file__": str(script)}
+    with contextlib.chdir(folder):
+        return _page(script, lambda code: _printed(code, script, variables))
+
+
+def unprinted(script: Path) -> str:
+    """The page of a script without what it prints, for which nothing is run."""
+    return _page(script, lambda code: "")
+
+
+def without_prints(page: str) -> str:
+    """A page without what its script printed."""
+    return _PRINTED.sub("", page)
+
+
+def _page(script: Path, printed_by: Callable[[str], str]) -> str:
     source = script.read_text(encoding="utf-8")
     name = script.relative_to(ROOT).as_posix()
-    parts, variables = [], {"__name__": "__main__", "__file__": str(script)}
-    edges = [*_CELL.finditer(source), None]
-    with contextlib.chdir(folder):
-        for cell, following in pairwise(edges):
-            assert cell is not None
-            body = source[cell.end() : following.start() if following else len(source)].strip("\n")
-            if "[markdown]" in cell[1]:
-                parts.append(re.sub(r"^# ?", "", body, flags=re.MULTILINE))
-                continue
-            printed = _printed("\n" * source.count("\n", 0, cell.end()) + body, script, variables)
-            parts.append(f"```python\n{body}\n```")
-            if printed:
-                parts.append(f"```text\n{printed}\n```")
+    parts = []
+    for cell, following in pairwise([*_CELL.finditer(source), None]):
+        assert cell is not None
+        body = source[cell.end() : following.start() if following else len(source)].strip("\n")
+        if "[markdown]" in cell[1]:
+            parts.append(re.sub(r"^# ?", "", body, flags=re.MULTILINE))
+            continue
+        # Behind empty lines, so that an error names the script's own line.
+        printed = printed_by("\n" * source.count("\n", 0, cell.end()) + body)
+        parts.append(f"```python\n{body}\n```")
+        if printed:
+            parts.append(f"```text\n{printed}\n```")
     title, *rest = parts
     made = (
-        f"[`{name}`](../../{name}) as a page: its text, its code, and what it printed. The suite runs it and compares "
-        f"the numbers, to {TOLERANCE} units in the last digit."
+        f"[`{name}`](../../{name}) as a page: its text, its code, and what it printed. `make test-all` runs it and "
+        f"compares the numbers, to {TOLERANCE} units in the last digit."
     )
     heading, _, introduction = title.partition("\n")
     return "\n\n".join(part.strip("\n") for part in (heading, introduction, made, *rest)) + "\n"

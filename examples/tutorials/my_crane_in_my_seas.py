@@ -105,7 +105,7 @@ def compare(file: str) -> None:
     print(f"{'':24} median    mean  worst 5 %  share of optimum  RMS, m")
     for row in comparison.rows:
         reduction, mean, tail, share = (100 * x.value for x in (row.reduction, row.mean, row.tail, row.share))
-        print(f"{row.policy:25}{reduction:5.1f} %{mean:6.1f} %{tail:9.1f} %{share:16.1f} %{row.rms.value:8.3f}")
+        print(f"{row.policy:25}{reduction:5.0f} %{mean:6.0f} %{tail:9.0f} %{share:16.0f} %{row.rms.value:8.2f}")
 
 
 compare("mine.toml")

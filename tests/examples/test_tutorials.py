@@ -8,11 +8,26 @@ import pytest
 
 from docs.site import tutorials
 
+QUICK = "my_controller_against_theirs"
 
-@pytest.mark.parametrize("script", tutorials.SCRIPTS, ids=lambda script: script.stem)
+
+@pytest.mark.parametrize(
+    "script",
+    [
+        pytest.param(script, id=script.stem, marks=() if script.stem == QUICK else pytest.mark.slow)
+        for script in tutorials.SCRIPTS
+    ],
+)
 def test_a_tutorial_does_what_its_page_shows(script: Path, tmp_path: Path) -> None:
     page = tutorials.page_of(script).read_text(encoding="utf-8")
     assert tutorials.differences(page, tutorials.run(script, tmp_path)) == []
+
+
+@pytest.mark.parametrize("script", tutorials.SCRIPTS, ids=lambda script: script.stem)
+def test_a_page_has_its_script_s_text_and_code(script: Path) -> None:
+    page = tutorials.page_of(script).read_text(encoding="utf-8")
+    assert "```text\n" in page
+    assert tutorials.without_prints(page) == tutorials.unprinted(script)
 
 
 def test_every_page_has_a_script() -> None:

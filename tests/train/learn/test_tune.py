@@ -7,6 +7,7 @@ import pytest
 from aframe_env import ScenarioDistribution
 from train.learn import tune
 from train.learn.registry import find_learner
+from train.shared.job_store import JobStore
 
 TINY = ("--timesteps", 256, "--scenarios", 3)
 
@@ -59,6 +60,32 @@ def test_another_search_in_the_same_folder_is_refused(tmp_path, monkeypatch, cap
     assert len(trials(out)) == 1
 
 
+class Killed(BaseException):
+    """What a process that is killed never sees."""
+
+
+def test_a_search_that_stops_behind_a_trial_ends_with_the_same_bytes(tmp_path, monkeypatch):
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    few = (*TINY, "--trials", 2, "--out")
+    assert command(monkeypatch, *few, whole) == 0
+    write, written = JobStore.write, []
+
+    def kept(store, key, result):
+        write(store, key, result)
+        written.append(key)
+        if len(written) == 1:
+            raise Killed
+
+    monkeypatch.setattr(JobStore, "write", kept)
+    with pytest.raises(Killed):
+        command(monkeypatch, *few, parts)
+    assert command(monkeypatch, *few, parts) == 0
+    assert len(set(written)) == len(written) == 2
+    for name in ("trials.csv", "study.md"):
+        assert (parts / name).read_bytes() == (whole / name).read_bytes()
+
+
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="needs SIGKILL")
 def test_a_killed_search_ends_with_the_same_bytes(tmp_path, kill_module, run_module):
     whole, parts = tmp_path / "whole", tmp_path / "parts"
