@@ -37,7 +37,7 @@ class Options:
     seed: int = 0
     """Of all random moments."""
     out: Path = Path("results/reliability.json")
-    """File that is written."""
+    """File that is written; rows of other trials that it has already are kept."""
 
     def __post_init__(self) -> None:
         require_integer("kills", self.kills, low=1, high=10**6)
@@ -71,7 +71,7 @@ def run(options: Options, console: Console) -> int:
                 for failure in outcome.failures:
                     console.print(f"{trial.name}: {failure}", markup=False, highlight=False)
                 results.save(partial)
-    results.save(options.out)
+    results.beside(options.out).save(options.out)
     partial.unlink(missing_ok=True)
     table = Table("trial", "tried", "survived", "of these", "s")
     for name, row in results.rows.items():

@@ -45,6 +45,10 @@ class Row:
 
     what: str
     wanted: int
+    command: str
+    """The command that repeats it."""
+    seed: int
+    versions: dict[str, str]
     tried: int = 0
     survived: int = 0
     attempts: int = 0
@@ -67,22 +71,28 @@ class Row:
 class Results:
     """Rows of a run, finished or not."""
 
-    command: str
-    seed: int
-    versions: dict[str, str]
     rows: dict[str, Row]
 
     @classmethod
     def begin(cls, command: str, seed: int, trials: list[Trial], partial: Path) -> Results:
         """Those of an interrupted run of the same command and versions; empty ones if there is none."""
-        new = cls(command, seed, versions(), {trial.name: Row(trial.what, trial.wanted) for trial in trials})
+        here = versions()
+        new = cls({trial.name: Row(trial.what, trial.wanted, command, seed, here) for trial in trials})
         if partial.exists():
-            old = structure(strict_converter(), json.loads(partial.read_text(encoding="utf-8")), cls, str(partial))
-            rows = [(name, row.what, row.wanted) for name, row in old.rows.items()]
-            same = rows == [(name, row.what, row.wanted) for name, row in new.rows.items()]
-            if same and (old.command, old.seed, old.versions) == (new.command, new.seed, new.versions):
+            old = cls.read(partial)
+            if [*map(_asked, old.rows.items())] == [*map(_asked, new.rows.items())]:
                 return old
         return new
+
+    @classmethod
+    def read(cls, path: Path) -> Results:
+        """Read a file that ``save`` wrote."""
+        return structure(strict_converter(), json.loads(path.read_text(encoding="utf-8")), cls, str(path))
+
+    def beside(self, path: Path) -> Results:
+        """These rows, and those of a finished run in ``path`` that this one has not tried."""
+        others = self.read(path).rows if path.exists() else {}
+        return Results({**others, **self.rows})
 
     @property
     def survived(self) -> bool:
@@ -93,6 +103,11 @@ class Results:
         """Write them, all or nothing."""
         data: dict[str, Any] = strict_converter().unstructure(self)
         write_json(path, data)
+
+
+def _asked(item: tuple[str, Row]) -> tuple[Any, ...]:
+    name, row = item
+    return name, row.what, row.wanted, row.command, row.seed, row.versions
 
 
 def attempts(trial: Trial, row: Row, seed: int) -> Iterator[Outcome]:

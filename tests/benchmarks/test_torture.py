@@ -13,7 +13,7 @@ from rich.console import Console
 from benchmarks.torture import __main__ as torture
 from benchmarks.torture import full_disk, kills, studies
 from benchmarks.torture.processes import start
-from benchmarks.torture.trial import Outcome, Trial
+from benchmarks.torture.trial import Outcome, Results, Trial, attempts
 
 if sys.platform == "win32":
     pytest.skip("needs fork and signals", allow_module_level=True)
@@ -112,3 +112,19 @@ def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     (row,) = found["rows"].values()
     assert (row["tried"], row["survived"], row["counts"], row["failures"]) == (5, 3, {"odd": 3}, ["lost"] * 3)
     assert not list(tmp_path.glob("*.partial.json"))
+
+
+def test_rows_of_other_trials_are_kept(tmp_path):
+    def trial(name):
+        return Trial(name=name, what="nothing", wanted=1, attempt=lambda rng, folder, most: Outcome(1, 1))
+
+    file = tmp_path / "results.json"
+    for names in (("a", "b"), ("b", "c")):
+        trials = [trial(name) for name in names]
+        results = Results.begin(f"try {names[0]}", 0, trials, tmp_path / "partial.json")
+        for each in trials:
+            assert len(list(attempts(each, results.rows[each.name], 0))) == 1
+        results.beside(file).save(file)
+    rows = Results.read(file).rows
+    assert {name: row.command for name, row in rows.items()} == {"a": "try a", "b": "try b", "c": "try b"}
+    assert all(row.survived == 1 for row in rows.values())

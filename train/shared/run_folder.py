@@ -196,7 +196,7 @@ def open_run(options: RunOptions, name: str, *, goes_on: bool = False) -> Run:
         new_folder(folder, overwrite=options.overwrite or _hardly_begun(folder))
     _lock(folder)
     if taken_up:
-        for left in folder.iterdir():
+        for left in list(folder.rglob(".*")):
             if _TEMPORARY.fullmatch(left.name):  # of a file that was being written when the run was killed
                 left.unlink()
     return Run(folder, command_line(name), taken_up)

@@ -74,11 +74,12 @@ def test_a_run_that_was_killed_before_it_was_recorded_begins_anew(tmp_path):
 def test_a_run_that_goes_on_sweeps_up_what_a_kill_left_half_written(tmp_path):
     options = RunOptions(out=tmp_path / "run")
     open_run(options, "train.drives", goes_on=True).record(options)
-    for name in (".summary.k3_x9q1z.json", "mine.json", ".hidden"):
+    (tmp_path / "run" / "swell").mkdir()
+    for name in (".summary.k3_x9q1z.json", "swell/.summary.k3_x9q1z.json", "mine.json", ".hidden", "swell/mine.json"):
         (tmp_path / "run" / name).write_text("{")
     assert open_run(options, "train.drives", goes_on=True).taken_up
-    left = {path.name for path in (tmp_path / "run").iterdir()}
-    assert left == {"config.toml", "run.json", "mine.json", ".hidden"}
+    left = {path.relative_to(tmp_path / "run").as_posix() for path in (tmp_path / "run").rglob("*")}
+    assert left == {"config.toml", "run.json", "mine.json", ".hidden", "swell", "swell/mine.json"}
 
 
 def test_files(tmp_path):
