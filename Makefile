@@ -14,7 +14,7 @@ help:
 	@echo "make test      run the suite but for what is marked slow (some ten minutes on two cores)"
 	@echo "make test-all  run all of it: whole trainings, kills, tutorials (some half an hour)"
 	@echo "make check     lint, format, layers, types"
-	@echo "make torture   kill trainings, fill disks, and count what is lost (some ten minutes)"
+	@echo "make torture   kill trainings and studies, fill disks, and count what is lost (an hour or two)"
 	@echo "make drives | verify | results | bench | compat | clean"
 
 train: .venv/installed

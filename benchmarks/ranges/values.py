@@ -15,7 +15,18 @@ from typing import Any, Final
 from hypothesis import assume
 from hypothesis import strategies as st
 
-from aframe_env import Crane, InvalidValue, LoadShape, Scenario, ScenarioDistribution, Sensors, Water
+from aframe_env import (
+    Compensator,
+    Crane,
+    InvalidValue,
+    LoadShape,
+    Scenario,
+    ScenarioDistribution,
+    Seabed,
+    Sensors,
+    TargetPath,
+    Water,
+)
 from aframe_env.scenario.motion import COORDINATES, Harmonic, HarmonicMotion, ShipMotion
 from aframe_env.scenario.scenario import INITIALS
 from aframe_env.scenario.sea import SPECTRA, Sea, SeaMotion
@@ -113,6 +124,8 @@ def made(make: Callable[[], Any]) -> Any:
 def cranes(draw: st.DrawFn) -> Crane:
     """Cranes from all over the ranges."""
     crane: Crane = changed(Crane(), draw)
+    if draw(st.booleans()):
+        crane = made(lambda: replace(crane, compensator=changed(Compensator(), draw)))
     return crane
 
 
@@ -136,7 +149,18 @@ def waters(draw: st.DrawFn) -> dict[str, Any]:
     velocities = st.floats(-5.0, 5.0)
     depths = draw(st.lists(st.integers(0, 5000), max_size=8, unique=True))
     current = tuple((float(depth), draw(velocities), draw(velocities)) for depth in sorted(depths))
-    return {"water": replace(changed(Water(), draw), current=current), "load": changed(LoadShape(), draw)}
+    changes = {"current": current, "waves": draw(st.booleans())}
+    if draw(st.booleans()):
+        changes["seabed"] = changed(Seabed(depth=500.0), draw)
+    return {"water": replace(changed(Water(), draw), **changes), "load": changed(LoadShape(), draw)}
+
+
+@st.composite
+def target_paths(draw: st.DrawFn) -> TargetPath:
+    """Targets that go up and down."""
+    times, changes = draw(st.lists(st.floats(1.0, 60.0), min_size=2, max_size=16, unique=True)), st.floats(-30.0, 30.0)
+    corners = [(time, draw(changes) if k else 0.0) for k, time in enumerate(sorted(times))]
+    return made(lambda: changed(TargetPath(corners=tuple(corners)), draw))
 
 
 @st.composite
@@ -158,6 +182,8 @@ def scenarios(draw: st.DrawFn) -> Scenario:
     changes["initial"] = draw(st.sampled_from(INITIALS))
     if draw(st.booleans()):
         changes |= draw(waters())
+    if draw(st.booleans()):
+        changes["target_path"] = draw(target_paths())
     scenario: Scenario = made(lambda: replace(start, **changes))
     return scenario
 

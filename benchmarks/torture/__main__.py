@@ -1,6 +1,6 @@
 """Try to lose work: kill commands, and a cluster's workers, at random moments, fill disks; count what survives.
 
-``python -m benchmarks.torture`` takes some ten minutes and writes results/reliability.json; interrupted, the same
+``python -m benchmarks.torture`` takes an hour or two and writes results/reliability.json; interrupted, the same
 command goes on where it was. All moments are drawn from --seed; what they hit is up to the machine. Linux and macOS.
 """
 

@@ -25,7 +25,7 @@ from aframe_env import (
 )
 from aframe_env.dynamics import layout as at
 from aframe_env.engine import Engine
-from tests.dynamics.wet_oracle import Lift
+from train.verify.vertical import Lift
 
 SEA = SeaMotion(sea=Sea(hs=3.0, tp=9.0, heading=2.4, components=24, seed=3, spreading=4))
 BOX = LoadShape(

@@ -10,7 +10,7 @@ import pytest
 from aframe_env import Compensator, Crane, Harmonic, HarmonicMotion, InvalidValue, Rope, Scenario, Winch
 from aframe_env.dynamics import layout as at
 from aframe_env.engine import Engine
-from tests.dynamics.wet_oracle import Lift
+from train.verify.vertical import Lift
 
 WEIGHT = 50e3 * 9.81
 RADIUS = 0.75

@@ -43,7 +43,7 @@ from train.shared.cli import parse
 from train.shared.console import PlainConsole
 from train.shared.job_store import JobStore, version_of
 from train.shared.run_folder import RunOptions, new_file, open_jobs, user_errors, write_json, write_text
-from train.verify import frame_checks, rope_cases, rope_checks, run_checks
+from train.verify import frame_checks, rope_cases, rope_checks, run_checks, water_checks
 from train.verify.cases import (
     FORMAT,
     dynamic_case,
@@ -89,6 +89,7 @@ WATER_CHECKS: Sequence[Callable[[], Check | list[Check]]] = (
     rope_checks.transfer,
     rope_checks.massless_limit,
     rope_checks.energy,
+    *water_checks.CHECKS,
 )
 """Every check of heavy ropes and loads in water."""
 

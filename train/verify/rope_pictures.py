@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from train.verify.pictures import HERE, REFERENCE, save
 from train.verify.rope_checks import BARS, TITLES, histories, responses, table
+from train.verify.water_checks import Episode, landing, splash
 
 
 def draw_ropes(folder: Path) -> list[Path]:
     """Draw the pictures into a folder; return their files."""
-    pictures = {"reference_cases": _cases(), "load_over_pulley": _responses()}
+    pictures = {"reference_cases": _cases(), "load_over_pulley": _responses(), "surface_and_bed": _ways()}
     paths = []
     for name, figure in pictures.items():
         paths.append(folder / f"{name}.png")
@@ -88,3 +90,36 @@ def _responses() -> Figure:
     axes[0][0].plot([], [], color="0.6", label="rope without mass, no drag")
     axes[0][0].legend(loc="upper right", fontsize=8)
     return figure
+
+
+def _ways() -> Figure:
+    """A load on its way through the surface, and another onto the seabed."""
+    figure = Figure(figsize=(13, 6.4), layout="constrained")
+    axes = figure.subplots(2, 2, sharex="col", height_ratios=(3, 2))
+    lifts = ((splash(), "manifold of 100 t through the surface"), (landing(), "60 t onto the seabed"))
+    for column, (lift, title) in zip(axes.T, lifts, strict=True):
+        _way(column[0], lift)
+        column[0].set_title(title, loc="left", fontsize=10)
+        column[1].plot(lift.times, lift.tension / 1e3, color="#2ca02c", linewidth=1)
+        column[1].set_ylabel("tension at the load, kN")
+        column[1].set_xlabel("time, s")
+        for axis in column:
+            axis.grid(alpha=0.3)
+    axes[0][0].legend(loc="upper right", fontsize=8)
+    return figure
+
+
+def _way(axis: Any, lift: Episode) -> None:
+    """Draw the load with its height, and what it goes through or comes down on."""
+    axis.fill_between(
+        lift.times, lift.z - 0.5 * lift.height, lift.z + 0.5 * lift.height, color=HERE, alpha=0.15, label="the load"
+    )
+    axis.plot(lift.times, lift.reference, color=REFERENCE, linewidth=3, alpha=0.4, label="its middle, SciPy")
+    axis.plot(lift.times, lift.z, color=HERE, linewidth=1, label="its middle, here")
+    low, high = lift.z.min() - lift.height, lift.z.max() + lift.height
+    for level, color in ((lift.surface, "#1f77b4"), (lift.bed, "#8c564b")):
+        if low < level < high:
+            axis.axhspan(low, level, color=color, alpha=0.12)
+            axis.axhline(level, color=color, linewidth=1)
+    axis.set_ylim(low, high)
+    axis.set_ylabel("z, m")

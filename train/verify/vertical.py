@@ -40,6 +40,7 @@ class Lift:
         return max(0.0, stiffness * elongation + s.total_rope_damping * stretching)
 
     def rates(self, t: float, state: FloatArray) -> list[float]:
+        """Rates of level, velocity and the cylinder's stroke."""
         s, load = self.scenario, self.scenario.load
         z, v = float(state[0]), float(state[1])
         given, given_rate = 0.0, 0.0
