@@ -82,7 +82,6 @@ class Options(RunOptions, Where):
 
 def compute(options: Options, opened: Run, bars: Progress) -> Study:
     """Compute what is not finished yet."""
-    version = version_of(aframe_env, agents, lifts, zero_shot, harmonics, passage)
     every = zero_shot.trials(options.depths, options.lifts)
     trials = [trial for trial in every if trial.policy in options.policies]
     grid, nodes = options.grid, options.grid.nodes
@@ -91,10 +90,10 @@ def compute(options: Options, opened: Run, bars: Progress) -> Study:
         for policy in passage.POLICIES
     ]
     with (
-        JobStore(opened.jobs, zero_shot.Left, version) as left,
-        JobStore(opened.jobs, harmonics.Found, version) as found,
-        JobStore(opened.jobs, harmonics.Checked, version) as checked,
-        JobStore(opened.jobs, passage.Passed, version) as passed,
+        JobStore(opened.jobs, zero_shot.Left, version_of(aframe_env, agents, lifts, zero_shot)) as left,
+        JobStore(opened.jobs, harmonics.Found, version_of(aframe_env, agents, lifts, harmonics)) as found,
+        JobStore(opened.jobs, harmonics.Checked, version_of(aframe_env, agents, lifts, harmonics)) as checked,
+        JobStore(opened.jobs, passage.Passed, version_of(aframe_env, agents, lifts, passage)) as passed,
     ):
         zero = run_jobs(
             zero_shot.try_policy,

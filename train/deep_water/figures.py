@@ -127,7 +127,7 @@ def draw_lowering(path: Path, study: Study) -> None:
     bobbing.plot(depths[moving], period, color="black", label="bobbing of the load")
     bobbing.axhline(passage.tp, color="#888888", ls="--", label="peak period of the sea")
     bobbing.set(xlabel="depth below the pulley, m", ylabel="period, s")
-    bobbing.legend(loc="upper left", fontsize=9)
+    bobbing.legend(loc="lower right", fontsize=9)
     for axis in (errors, bobbing):
         axis.grid(alpha=0.3)
     figure.legend(*errors.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=9)

@@ -199,7 +199,7 @@ def _still(study: Study) -> str:
 
 
 def _lowering(study: Study) -> str:
-    passage = study.passages[0][0]
+    passage, _ = study.passages[0]
     edges = np.linspace(passage.top, passage.bottom, BANDS + 1)
     depths = passage.depths
     headings = ["", *(f"{a:,.0f} to {b:,.0f} m" for a, b in itertools.pairwise(edges)), "all"]

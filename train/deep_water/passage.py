@@ -18,10 +18,10 @@ from agents.registry import BuildContext, choose
 from agents.rollout import run
 from train.deep_water.lifts import DEEP_CRANE, MANIFOLD, lifts, shape
 
-START: Final = 20.0
+START: Final = 25.0
 """Time at which the lowering begins, s."""
-CORNER: Final = 10.0
-"""Time over which it gathers speed, s."""
+CORNER: Final = 40.0
+"""Time over which it gathers speed, and comes to rest, s: several times the period of the bobbing."""
 EVERY: Final = 2
 """Control steps from one depth error that is kept to the next."""
 POLICIES: Final = ("drum still", "feed-forward + feedback", "predictive control", "ppo-sensors")
@@ -61,7 +61,7 @@ class Passage:
     @property
     def duration(self) -> float:
         """s."""
-        return 20.0 + START + (self.bottom - self.top) / self.speed
+        return START + (self.bottom - self.top) / self.speed + 0.5 * CORNER + 20.0
 
     @property
     def depths(self) -> FloatArray:
