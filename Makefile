@@ -52,6 +52,7 @@ results: .venv/installed-test
 		--policies predictive-ppo ppo sac ppo-speed sac-speed predictive-ppo-sensors ppo-sensors sac-sensors \
 		"predictive control (state)" "predictive control" "feed-forward + feedback (state)" "feed-forward + feedback"
 	$(BIN)/python -m train.sensitivity --overwrite --out results/sensitivity
+	$(BIN)/python -m train.deep_water --overwrite --out results/deep-water
 	$(BIN)/python -m train.verify
 	$(BIN)/python -m train.verify --water --overwrite --folder results/verification/water
 

@@ -20,6 +20,7 @@ COMMANDS: Final[Mapping[str, str]] = {
     "drive-map": "build the map of basic drives",
     "optimisers": "compare Gauss-Newton with Nelder-Mead",
     "sensitivity": "study policies that were told wrongly",
+    "deep-water": "study what heavy ropes in deep water do to control",
     "tune": "search for a learner's hyper-parameters",
     "tune-control": "tune the gains of the control laws",
     "verify": "check the full model, or run a case of your own on it",

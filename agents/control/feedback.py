@@ -53,15 +53,24 @@ class Feedback:
         """Begin N episodes; of the scenarios only what a ``Lift`` has is looked at."""
         self._scenarios, self._period, self._hoists = scenarios, control_period, None
 
+    def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
+        """Go on with other ropes, as by ``HoistBatch.retune``."""
+        if self._hoists is not None:
+            self._observer.retune(self._hoists.retune(rope_length, growth))
+            self._regulator = self._hoists.regulator(self._tuned)
+
+    @property
+    def _tuned(self) -> Gains:
+        return self.gains or (STATE_GAINS if self.sensors is None else SENSOR_GAINS)
+
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for readings (N, 10), or observations (N, 14) of the full state."""
         if self._hoists is None:
-            quantities, tuned = (STATE, STATE_GAINS) if self.sensors is None else (SENSED, SENSOR_GAINS)
-            gains = self.gains or tuned
+            quantities = STATE if self.sensors is None else SENSED
             hoists = self._hoists = HoistBatch(len(observation), self._period, quantities)
             o = hoists.start(self._scenarios, observation)
-            self._regulator = hoists.regulator(gains)
-            self._observer = observer_for(hoists, gains.damping_ratio, self.sensors, self.waves)
+            self._regulator = hoists.regulator(self._tuned)
+            self._observer = observer_for(hoists, self._tuned.damping_ratio, self.sensors, self.waves)
             self._observer.start(o)
         else:
             hoists = self._hoists

@@ -354,17 +354,27 @@ class RopeFilter:
 
     def start(self, model: RopeModel, period: float, stretch_noise: FloatArray, rows: Rows = ALL) -> None:
         """Begin in these rows with loads at rest; ``stretch_noise`` (n,) of a reading of the stretch, m."""
+        self._tune(model, period, stretch_noise, rows)
+        covariance = np.tile(np.diag([1e-4, 1e-4, 1e-4, 0.0]), (len(stretch_noise), 1, 1))
+        covariance[:, 3, 3] = stretch_noise**2
+        self._covariance[rows] = covariance
+        self._x[rows] = 0.0
+
+    def retune(self, model: RopeModel, period: float, stretch_noise: FloatArray, longer: FloatArray) -> None:
+        """Go on with other ropes, ``longer`` (N,) by that factor: the error of the weight stretches them by as much."""
+        self._tune(model, period, stretch_noise, ALL)
+        self._x[:, 3] *= longer
+        self._covariance[:, 3, :] *= longer[:, None]
+        self._covariance[:, :, 3] *= longer[:, None]
+
+    def _tune(self, model: RopeModel, period: float, stretch_noise: FloatArray, rows: Rows) -> None:
         a, b = np.zeros((len(stretch_noise), 4, 4)), np.zeros((len(stretch_noise), 4))
         a[:, :3, :3], a[:, 3, 3] = model.a[:, :3, :3], 1.0
         b[:, :3] = model.b[:, :3]
         process_noise = self._rate_noise**2 * b[:, :, None] * b[:, None, :]
         process_noise[:, 1, 1] += (ACCELERATION_NOISE * period) ** 2
         self._a[rows], self._b[rows], self._process_noise[rows] = a, b, process_noise
-        covariance = np.tile(np.diag([1e-4, 1e-4, 1e-4, 0.0]), (len(stretch_noise), 1, 1))
-        covariance[:, 3, 3] = stretch_noise**2
-        self._covariance[rows] = covariance
         self._noise[rows] = stretch_noise**2
-        self._x[rows] = 0.0
 
     def advance(self, speed: FloatArray, stretch: FloatArray) -> None:
         """Take the mean speed (N,) m/s of the rope's end over a control step, and the stretch (N,) m at its end."""

@@ -44,6 +44,11 @@ class KalmanObserver:
         self._turns[:, rows] = 0.0
         self._start(o, rows)
 
+    def retune(self, longer: FloatArray) -> None:
+        """Go on with the hoists as they are now, the ropes ``longer`` (N,) by that factor; what is known stays."""
+        self.model.replace(ALL, self._hoists.model(self._damping_ratio))
+        self._rope.retune(self.model, self._hoists.period, self._stretch_noise(ALL), longer)
+
     def advance(self, turned: FloatArray, o: Columns) -> None:
         """Take the readings a control step later, during which the drums turned by ``turned`` (N,) rad."""
         if len(self._turns):
@@ -82,13 +87,17 @@ class KalmanObserver:
         return self._hoists.period * np.arange(len(self._turns), len(self._turns) + count, dtype=np.float64)
 
     def _start(self, o: Columns, rows: Rows) -> None:
-        hoists, tension = self._hoists, self._tension
-        noise = np.maximum(tension.noise, tension.relative_noise * hoists.weighed[rows] * GRAVITY)
-        model = hoists.model(self._damping_ratio, rows)
-        self._rope.start(model, hoists.period, hoists.stretch_under(noise, o, rows), rows)
+        model = self._hoists.model(self._damping_ratio, rows)
+        self._rope.start(model, self._hoists.period, self._stretch_noise(rows), rows)
         self.waves.start(rows)
         self._heave_rate[rows], self._drum_angle[rows] = o["pulley_velocity_z"], o["drum_angle"]
         self._first_angle[rows], self._depth_error[rows] = o["drum_angle"], 0.0
+
+    def _stretch_noise(self, rows: Rows) -> FloatArray:
+        """Standard deviation (n,) m of a reading of the ropes' stretch."""
+        hoists, tension = self._hoists, self._tension
+        noise = np.maximum(tension.noise, tension.relative_noise * hoists.weighed[rows] * GRAVITY)
+        return hoists.stretch_under(noise, {"rope_length": hoists.rope_length[rows]}, rows)
 
     def _advance(self, o: Columns) -> None:
         radius, heave_rate, drum_angle = self._hoists.winch.radius, o["pulley_velocity_z"], o["drum_angle"]
@@ -119,6 +128,10 @@ class StateObserver:
         self.model.replace(rows, self._hoists.model(self._damping_ratio, rows))
         self.waves.start(rows)
         self._look(o, rows)
+
+    def retune(self, longer: FloatArray) -> None:
+        """Go on with the hoists as they are now."""
+        self.model.replace(ALL, self._hoists.model(self._damping_ratio))
 
     def advance(self, turned: FloatArray, o: Columns) -> None:
         """Take the observations a control step later."""

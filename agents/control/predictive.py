@@ -105,11 +105,19 @@ class Planner:
         """Begin hoists in these rows with first observations (n, K); return these by their names."""
         o = self.hoists.start(lifts, observation, rows)
         self._observer.start(o, rows)
+        self._tune(rows)
+        return o
+
+    def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
+        """Go on with other ropes, as by ``HoistBatch.retune``."""
+        self._observer.retune(self.hoists.retune(rope_length, growth))
+        self._tune(ALL)
+
+    def _tune(self, rows: Rows) -> None:
         model = self.hoists.model(self._config.damping_ratio, rows)
         self._efforts[rows] = efforts = self.hoists.efforts(self._config.price, rows)
         self._cost_to_go[rows] = cost_to_go = model.costs_to_go(efforts)
         self._k[rows] = model.gains_for(cost_to_go, efforts)
-        return o
 
     def advance(self, observation: Observation) -> Columns:
         """Take the observations (N, K) of all rows, one control step later; return them by their names."""
@@ -225,6 +233,11 @@ class PredictiveControl:
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes; of the scenarios only what a ``Lift`` has is looked at."""
         self._lifts, self._period, self._planner = scenarios, control_period, None
+
+    def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
+        """Go on with other ropes, as by ``HoistBatch.retune``."""
+        if self._planner is not None:
+            self._planner.retune(rope_length, growth)
 
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for readings (N, 10), or observations (N, 14) of the full state."""

@@ -13,7 +13,7 @@ from aframe_env.scenario.crane import GRAVITY
 from aframe_env.task import Quantity
 from aframe_env.validation import InvalidValue, require_number
 from agents.control.filters import ALL, FloatArray, Rows
-from agents.control.lift import LEAST_WEIGHT, Lift, unweighed
+from agents.control.lift import LEAST_WEIGHT, Lift, Unweighed, unweighed
 from agents.control.rope import RopeModel
 from agents.control.winch import WinchModel
 
@@ -83,7 +83,11 @@ class HoistBatch:
         self._axial_stiffness, self._weight, self.weighed, self.mass, self.frequency = np.ones((5, rows))
         """``weighed`` (N,) kg: mass that would weigh in air as much as hangs on the pulley; ``mass`` (N,) kg that bobs
         on the ropes, the same with a light rope in air; ``frequency`` of the bobbing, rad/s."""
+        self.rope_length = np.ones(rows)
+        """(N,) m of unstretched rope that all of this is for."""
         self._least_effort = np.zeros(rows)
+        self._drum_radius = np.ones(rows)
+        self._unweighed = np.zeros((len(Unweighed._fields), rows))
         self.heavy = np.zeros(rows, dtype=np.bool_)
         """(N,) rows whose rope has mass, or is in water."""
 
@@ -97,19 +101,34 @@ class HoistBatch:
         o = self.columns(observation)
         self._axial_stiffness[rows] = [lift.crane.rope.axial_stiffness for lift in lifts]
         self._weight[rows] = np.maximum(o["rope_tension"], LEAST_WEIGHT)
-        self.weighed[rows] = self._weight[rows] / GRAVITY
-        fixed, by_length, drum_part, softness, slowness = np.array([unweighed(lift) for lift in lifts]).T
-        below = o["rope_length"] - drum_part
+        self._drum_radius[rows] = self.winch.radius[rows]
+        self._unweighed[:, rows] = np.array([unweighed(lift) for lift in lifts]).T
+        self._tune(o["rope_length"], self._weight[rows], rows)
+        return o
+
+    def retune(self, rope_length: FloatArray, growth: FloatArray) -> FloatArray:
+        """Reckon from now on with ropes of ``rope_length`` (N,) m that weigh ``growth`` (N,) N more than at the start.
+
+        Tensions are read less that growth. Return by what factor the ropes are longer than before, (N,).
+        """
+        longer = rope_length / self.rope_length
+        self._tune(rope_length, self._weight + growth, ALL)
+        return np.asarray(longer)
+
+    def _tune(self, rope_length: FloatArray, weight: FloatArray, rows: Rows) -> None:
+        self.rope_length[rows] = rope_length
+        self.weighed[rows] = weight / GRAVITY
+        fixed, by_length, drum_part, softness, slowness = self._unweighed[:, rows]
+        below = rope_length - drum_part
         # A pin that reads less than the rope alone weighs must not make a mass of less than nothing.
         moved = self.weighed[rows] + (fixed + by_length * below)
         self.mass[rows] = np.maximum(moved, LEAST_WEIGHT / GRAVITY)
-        self.winch.radius[rows] *= 1.0 + softness * self._weight[rows]
-        self.frequency[rows] = np.sqrt(self._axial_stiffness[rows] / (o["rope_length"] * self.mass[rows]))
+        self.winch.radius[rows] = self._drum_radius[rows] * (1.0 + softness * weight)
+        self.frequency[rows] = np.sqrt(self._axial_stiffness[rows] / (rope_length * self.mass[rows]))
         # A regulator of this effort has its poles at (ω² / √effort / period)^¼.
         slower = (slowness * below / (QUICKEST * np.pi)) ** 4
         self._least_effort[rows] = np.square(self.frequency[rows] ** 2 * slower / self.period)
         self.heavy[rows] = softness > 0.0
-        return o
 
     def columns(self, observation: Observation) -> Columns:
         """The observation (N, K) by the names of its quantities."""

@@ -78,6 +78,10 @@ class PlanFeatures:
         self._take(self._planner.start(observation, lifts, rows), rows)
         return self._look()[rows]
 
+    def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
+        """Go on with other ropes, as by ``HoistBatch.retune``."""
+        self._planner.retune(rope_length, growth)
+
     def advance(self, observation: Observation) -> Float32Array:
         """Features (N, F) of all rows, whose observations (N, K) are one control step later."""
         self._take(self._planner.advance(observation), ALL)

@@ -1,0 +1,184 @@
+"""Lowering and hoisting: a wrapper by which policies that hold a load at its level follow a target that moves.
+
+The way of the target is known on board, and so is the rope that holds the load there. The drum pays that rope out, and
+the policy sees, and commands, what deviates from it: to the policy the load hangs at a level that holds, on a rope that
+slowly becomes another one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+
+from aframe_env.dynamics.start import heavy_lengths
+from aframe_env.scenario import Scenario
+from aframe_env.scenario.sensors import Sensors
+from aframe_env.task import SENSED, STATE
+from aframe_env.validation import InvalidValue
+from agents.control.lift import LEAST_WEIGHT
+from agents.control.regulator import Observation
+from agents.control.winch import WinchModel
+from agents.policy import FloatArray, Knowledge, Policy
+
+RETUNE_AT: Final = 0.05
+"""Change of a rope's length, as a share of it, after which a policy is tuned to it anew."""
+
+
+@runtime_checkable
+class Retunable(Protocol):
+    """A policy that can go on with a rope of another length without forgetting the waves."""
+
+    def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
+        """Reckon with ropes of ``rope_length`` (N,) m that weigh ``growth`` (N,) N more than at the start."""
+        ...
+
+
+class Planned(NamedTuple):
+    """Rope that holds a load on its way."""
+
+    length: float
+    """Unstretched, between drum and load, m."""
+    tension: float
+    """At the pulley, N."""
+    rate: float
+    """Velocity of the load, m/s."""
+
+
+@dataclass(frozen=True)
+class PayOut:
+    """Plan of one row: the load under water all the way, at rest or lowered so evenly that only drag holds it up."""
+
+    scenario: Scenario
+    """Only what a ``Lift`` has is looked at, and the way of the target."""
+    weight: float
+    """Of the load in its water, N."""
+
+    @classmethod
+    def weighed(cls, scenario: Scenario, tension: float) -> PayOut:
+        """Plan for the load that hangs still at ``target_level`` while the pulley bears a ``tension`` [N]."""
+        rope_weight, weight = scenario.rope_weight, tension
+        for _ in range(4):  # each time the strain, some 1e-3, takes what is wrong
+            weight = max(tension - rope_weight * cls(scenario, weight)._lengths(0.0, 0.0)[0], LEAST_WEIGHT)
+        return cls(scenario, weight)
+
+    def at(self, time: float) -> Planned:
+        """Plan ``time`` s after the start."""
+        path = self.scenario.target_path
+        change, rate = (0.0, 0.0) if path is None else path.at(time)
+        below, drum_part = self._lengths(change, rate)
+        weight, rope_weight = self._pull(rate)
+        return Planned(below + drum_part, weight + rope_weight * below, rate)
+
+    def _lengths(self, change: float, rate: float) -> tuple[float, float]:
+        scenario, crane = self.scenario, self.scenario.crane
+        weight, rope_weight = self._pull(rate)
+        length = crane.pulley_position[2] - scenario.target_level - change
+        return heavy_lengths(length, crane.drum_to_pulley, weight, crane.rope.axial_stiffness, rope_weight)
+
+    def _pull(self, rate: float) -> tuple[float, float]:
+        """Weight of the load [N] and of a metre of rope [N/m], with their drag at a velocity of ``rate`` m/s."""
+        scenario, rope = self.scenario, self.scenario.crane.rope
+        pressure = 0.5 * scenario.density * abs(rate) * rate
+        along = pressure * rope.tangential_drag * math.pi * rope.solid_diameter if rope.mass_per_length else 0.0
+        load = self.weight + pressure * scenario.load.drag_area_vertical
+        return max(load, LEAST_WEIGHT), scenario.rope_weight + along
+
+
+@dataclass
+class Following:
+    """Let ``policy`` follow the ``target_path`` of its scenarios."""
+
+    policy: Policy
+    sensors: Sensors | None = None
+    """Sensors that it acts on, for their delay; None for the full state."""
+    name: str = field(init=False)
+    knows: Knowledge = field(init=False)
+    _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
+    _period: float = field(init=False, repr=False, default=0.1)
+    _plans: list[PayOut] = field(init=False, repr=False, default_factory=list)
+    _first: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
+    """(N,) m and N, of the plans at the start."""
+    _tuned: FloatArray = field(init=False, repr=False)
+    """(N,) m that the policy is tuned to."""
+    _paid_out: FloatArray = field(init=False, repr=False)
+    """(N,) m since the start, by the encoder."""
+    _angle: FloatArray = field(init=False, repr=False)
+    """(N,) rad that it read last."""
+    _radius: FloatArray = field(init=False, repr=False)
+    """(N,) m, of the drums that the policy knows."""
+    _drums: WinchModel = field(init=False, repr=False)
+    _deviating: WinchModel = field(init=False, repr=False)
+    """Drums that turn as the policy commands."""
+
+    def __post_init__(self) -> None:
+        self.name, self.knows = f"{self.policy.name}, following", self.policy.knows
+        if (self.knows is Knowledge.SENSORS) != (self.sensors is not None):
+            raise InvalidValue(
+                f"sensors = {'None' if self.sensors is None else 'given'}: {self.policy.name} knows "
+                f"{self.knows.value}: must be given to a policy on sensors, and to no other"
+            )
+
+    def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
+        """Begin N episodes; of the scenarios only what a ``Lift`` has and the target's way is looked at."""
+        self._scenarios, self._period, self._plans = scenarios, control_period, []
+        self.policy.reset(scenarios, control_period)
+
+    def act(self, observation: Observation, time: float) -> FloatArray:
+        """Drum speed commands (N,) rad/s for observations (N, K)."""
+        o = observation.astype(np.float64)
+        columns = {q.name: i for i, q in enumerate(STATE if self.sensors is None else SENSED)}
+        if not self._plans:
+            self._start(o, columns)
+        then = time - (0.0 if self.sensors is None else self.sensors.delay)
+        length, tension, rate = self._planned(then)
+        now, later = self._planned(time)[0], self._planned(time + self._period)[0]
+        angle = o[:, columns["drum_angle"]].copy()
+        self._paid_out += self._drum_radius() * (angle - self._angle)
+        self._angle, actual = angle, self._drum_radius()
+        o[:, columns["drum_angle"]] = (self._paid_out - (length - self._first[0])) / self._radius
+        o[:, columns["rope_tension"]] -= tension - self._first[1]
+        if self.sensors is None:
+            o[:, columns["load_velocity_z"]] -= rate
+            # On another radius a drum that turns as far in a step ends it at another speed: the policy is told that of
+            # its own, and by how much the real one missed what was reckoned.
+            real = o[:, columns["drum_speed"]].copy()
+            self._deviating.speed += (real - self._drums.speed) * actual / self._radius
+            self._drums.speed = real
+            o[:, columns["drum_speed"]] = self._deviating.speed
+        else:
+            o[:, columns["rope_length"]] = length
+            speed = (self._planned(then + 0.05)[0] - self._planned(then - 0.05)[0]) / 0.1
+            o[:, columns["drum_speed"]] = (o[:, columns["drum_speed"]] * actual - speed) / self._radius
+        if np.any(abs(now / self._tuned - 1.0) > RETUNE_AT) and isinstance(self.policy, Retunable):
+            rope_weight = np.array([scenario.rope_weight for scenario in self._scenarios])
+            self.policy.retune(now, rope_weight * (now - self._first[0]))
+            self._tuned = now
+        turn = self._deviating.turn(self.policy.act(o.astype(np.float32), time))
+        command, _ = self._drums.command((self._radius * turn + later - now) / actual)
+        return command
+
+    def _start(self, o: FloatArray, columns: dict[str, int]) -> None:
+        tension = o[:, columns["rope_tension"]].tolist()
+        self._plans = [PayOut.weighed(s, each) for s, each in zip(self._scenarios, tension, strict=True)]
+        length, tensions, _ = self._planned(0.0)
+        self._first, self._tuned = (length, tensions), length
+        self._paid_out, self._angle = np.zeros(len(o)), o[:, columns["drum_angle"]].copy()
+        cranes = [scenario.crane for scenario in self._scenarios]
+        self._drums, self._deviating = WinchModel(len(o), self._period), WinchModel(len(o), self._period)
+        self._drums.start(cranes)
+        self._deviating.start(cranes)
+        self._radius = self._drums.radius
+
+    def _drum_radius(self) -> FloatArray:
+        """Radius (N,) m at which the ropes run off the drums."""
+        length = self._first[0] + self._paid_out
+        return np.array([s.crane.drum_radius(x) for s, x in zip(self._scenarios, length.tolist(), strict=True)])
+
+    def _planned(self, time: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Length [m], tension [N] and velocity of the load [m/s] by the plans, each (N,)."""
+        length, tension, rate = np.array([plan.at(max(time, 0.0)) for plan in self._plans]).T
+        return length, tension, rate

@@ -1,0 +1,90 @@
+"""Policies that follow a target on its way down."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aframe_env import Crane, HarmonicMotion, LoadShape, Rope, Scenario, Sea, SeaMotion, Sensors, Vessel, Water, Winch
+from aframe_env.scenario.target import TargetPath
+from aframe_env.validation import InvalidValue
+from agents.control.feedback import Feedback
+from agents.control.inverse_dynamics import InverseDynamics
+from agents.control.lowering import Following, PayOut
+from agents.control.predictive import PlanningConfig, PredictiveControl
+from agents.policy import DrumStill, Policy
+from agents.rollout import run
+
+DOWN = TargetPath.lowering(-20.0, 0.5, start=5.0, corner_time=8.0)
+CALM = HarmonicMotion(harmonics=())
+LIGHT = Scenario(motion=CALM, load_mass=50e3, target_level=-100.0, target_path=DOWN, rope_damping=2e4)
+HEAVY = Scenario(
+    crane=Crane(rope=Rope.six_strand()),
+    motion=CALM,
+    load_mass=50e3,
+    target_level=-1000.0,
+    target_path=DOWN,
+    water=Water(),
+    load=LoadShape(volume=6.4, added_mass_vertical=3e4, drag_area_vertical=20.0),
+)
+LAYERS = replace(HEAVY, crane=replace(HEAVY.crane, winch=Winch(drum_width=1.5)))
+
+
+def in_a_sea(scenario: Scenario) -> Scenario:
+    sea = Sea(hs=2.0, tp=8.0, heading=2.0, seed=1)
+    return replace(scenario, motion=SeaMotion(sea=sea, vessel=Vessel.supply()), ramp=10.0)
+
+
+@pytest.mark.parametrize("scenario", [LIGHT, HEAVY, LAYERS], ids=["light", "heavy", "layers"])
+@pytest.mark.parametrize(
+    "policy", [DrumStill(), Feedback(None), PredictiveControl(PlanningConfig(sensors=None))], ids=lambda p: p.name
+)
+def test_in_calm_water_the_load_ends_at_its_target(policy: Policy, scenario: Scenario) -> None:
+    episodes = run(Following(policy), [scenario], episode_duration=60.0)
+    end = episodes.error[0, -50:]
+    # Nothing but the rope calms what a still drum set bobbing.
+    assert abs(end.mean() if policy.name == DrumStill.name else abs(end).max()) < 0.002
+    assert episodes.omega2[0] < 0.06
+
+
+@pytest.mark.parametrize("scenario", [LIGHT, HEAVY, LAYERS], ids=["light", "heavy", "layers"])
+@pytest.mark.parametrize("sensors", [None, Sensors()], ids=["state", "sensors"])
+def test_in_a_sea_following_is_nearly_as_good_as_holding(scenario: Scenario, sensors: Sensors | None) -> None:
+    moving = in_a_sea(scenario)
+    holding = replace(moving, target_path=None, target_level=moving.target_level - 10.0)
+    see = "state" if sensors is None else "sensors"
+    still = run(DrumStill(), [holding], observation=see).rms[0]
+    held = run(Feedback(sensors), [holding], observation=see).rms[0]
+    followed = run(Following(Feedback(sensors), sensors), [moving], observation=see).rms[0]
+    assert followed < held + 0.02
+    assert followed < 0.1 * still
+
+
+def test_a_policy_is_tuned_to_a_rope_that_grows() -> None:
+    path = TargetPath.lowering(-160.0, 2.0, start=5.0)
+    scenario = in_a_sea(replace(LIGHT, target_level=-40.0, target_path=path))
+    holding = replace(scenario, target_level=-200.0, target_path=None)
+    policy, fresh = Feedback(None), Feedback(None)
+    run(Following(policy), [scenario], episode_duration=100.0)
+    run(fresh, [holding], episode_duration=1.0)
+    k, wanted = policy._regulator.k, fresh._regulator.k
+    assert k == pytest.approx(wanted, rel=0.1)
+    assert np.ptp([policy._hoists.frequency[0], fresh._hoists.frequency[0]]) < 0.05  # type: ignore[union-attr]
+
+
+def test_the_plan_is_the_rope_at_rest() -> None:
+    plan = PayOut.weighed(HEAVY, HEAVY.hanging_weight)
+    assert plan.weight == pytest.approx(HEAVY.weight, rel=1e-9)
+    below = replace(HEAVY, target_level=-1020.0, target_path=None)
+    assert plan.at(0.0).length == pytest.approx(HEAVY.free_length, abs=1e-6)
+    assert plan.at(60.0).length == pytest.approx(below.free_length, abs=1e-6)
+    assert plan.at(60.0).tension == pytest.approx(below.hanging_weight, rel=1e-9)
+
+
+def test_sensors_go_with_a_policy_on_sensors() -> None:
+    with pytest.raises(InvalidValue, match="sensors = None: feed-forward"):
+        Following(Feedback())
+    with pytest.raises(InvalidValue, match="sensors = given"):
+        Following(InverseDynamics(), Sensors())

@@ -1,0 +1,1 @@
+"""What deep water and heavy ropes do to control."""
