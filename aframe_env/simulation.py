@@ -157,7 +157,7 @@ class Simulation:
         """Mass, if it is told, and nominal unstretched rope length: known before the lift, (rows, 2)."""
         assert self.config.sensors is not None
         mass = self._engine.read(at.MASS) * self.config.sensors.mass_told
-        return np.stack([mass, self._engine.read(at.FREE_LENGTH)], axis=1)
+        return np.stack([mass, self._engine.read(at.START_LENGTH)], axis=1)
 
     def _sensed_truth(self) -> FloatArray:
         return task.sensed_truth(self.state, self._engine.deck()[:, 3:5])

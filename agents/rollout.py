@@ -144,7 +144,7 @@ class _Tally:
     def __init__(self, simulation: Simulation, scenarios: Sequence[Scenario]) -> None:
         rows, steps = simulation.rows, simulation.episode_steps
         self._simulation = simulation
-        self._radius = np.array([s.crane.winch.drum_radius for s in scenarios])
+        self._radius = np.array([s.crane.drum_radius(s.free_length) for s in scenarios])
         require_memory(f"{rows} episodes of {steps} control steps", rows * history_bytes(steps))
         self._histories = np.empty((len(HISTORY), rows, steps + 1), dtype=np.float32)
         self._step = 0

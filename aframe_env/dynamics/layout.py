@@ -101,7 +101,9 @@ AXIAL_STIFFNESS: Final = _take(1)
 ROPE_DAMPING: Final = _take(1)
 BREAKING_LOAD: Final = _take(1)
 FREE_LENGTH: Final = _take(1)
-"""l_0: unstretched length between drum and load at drum angle 0."""
+"""Unstretched length between drum and load at drum angle 0; l_0, unless the rope runs off another layer by now."""
+START_LENGTH: Final = _take(1)
+"""l_0: unstretched length between drum and load at the start."""
 DRUM_TO_PULLEY: Final = _take(1)
 DRUM_RADIUS: Final = _take(1)
 MAX_SPEED: Final = _take(1)

@@ -137,6 +137,7 @@ def write_lift(
     row[at.TARGET * lanes + j] = target
     row[at.ROPE_DAMPING * lanes + j] = rope_damping
     row[at.FREE_LENGTH * lanes + j] = length
+    row[at.START_LENGTH * lanes + j] = length
     row[at.MIN_ANGLE * lanes + j] = (least_length - length) / radius
     row[at.MAX_ANGLE * lanes + j] = (most_length - length) / radius
     row[at.SUBSTEPS * lanes + j] = substeps

@@ -33,7 +33,7 @@ class PartialFeedForward:
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes; of the scenarios only the crane is looked at."""
-        self._radius = np.array([scenario.crane.winch.drum_radius for scenario in scenarios])
+        self._radius = np.array([each.crane.drum_radius(each.free_length) for each in scenarios])
 
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for observations (N, K)."""

@@ -114,7 +114,7 @@ class InverseDynamics:
         if self._hoists is None:
             self._hoists = HoistBatch(len(observation), self._period, STATE)
             self._hoists.start(self._scenarios, observation)
-            radius = np.array([s.crane.winch.drum_radius for s in self._scenarios])
+            radius = np.array([s.crane.drum_radius(s.free_length) for s in self._scenarios])
             self._lengthened = self._hoists.winch.radius / radius
             self._regulator = self._hoists.regulator(self.gains)
             now = self._wanted()

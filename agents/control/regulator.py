@@ -101,7 +101,8 @@ class HoistBatch:
         o = self.columns(observation)
         self._axial_stiffness[rows] = [lift.crane.rope.axial_stiffness for lift in lifts]
         self._weight[rows] = np.maximum(o["rope_tension"], LEAST_WEIGHT)
-        self._drum_radius[rows] = self.winch.radius[rows]
+        lengths = o["rope_length"].tolist()
+        self._drum_radius[rows] = [lift.crane.drum_radius(x) for lift, x in zip(lifts, lengths, strict=True)]
         self._unweighed[:, rows] = np.array([unweighed(lift) for lift in lifts]).T
         self._tune(o["rope_length"], self._weight[rows], rows)
         return o

@@ -20,6 +20,7 @@ from aframe_env import (
     TaskConfig,
     Vessel,
     Water,
+    Winch,
 )
 from aframe_env.scenario.crane import GRAVITY
 from aframe_env.simulation import Simulation
@@ -165,3 +166,18 @@ def test_required_rope_is_that_of_a_rope_at_rest() -> None:
     deeper = replace(scenario, target_level=scenario.target_level - 2.0 * np.sin(2.0 * np.pi * time / 20.0))
     # The load swings a little in the current, and the rope is longer by that.
     assert rope.now()[0] == pytest.approx(deeper.free_length - scenario.free_length, abs=1e-3)
+
+
+def test_laws_reckon_with_the_layer_that_the_rope_runs_off() -> None:
+    """On a drum of many layers the laws do as well as on a plain one."""
+    plain = replace(at_depth(-200.0), ramp=10.0)
+    layered = replace(plain, crane=Crane(rope=HEAVY.rope, winch=Winch(drum_width=1.5)))
+    assert layered.crane.drum_radius(layered.free_length) > 1.1 * layered.crane.winch.drum_radius
+    for policy, observation in (
+        (Feedback(sensors=None), "state"),
+        (Feedback(), "sensors"),
+        (InverseDynamics(), "state"),
+    ):
+        task = TaskConfig(observation=observation)
+        rms = [float(run(policy, [each], task).rms[0]) for each in (plain, layered)]
+        assert rms[1] < 1.3 * rms[0] + 1e-3
