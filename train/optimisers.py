@@ -282,7 +282,7 @@ def main() -> int:
         write_text(opened.folder / "comparison.md", text)
         write_json(opened.folder / "comparison.json", [asdict(each) for each in found])
         opened.finish()
-        console.print(text, soft_wrap=True)
+        console.print(text)
     return 0
 
 

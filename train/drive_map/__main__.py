@@ -141,7 +141,7 @@ def run(options: Options, console: Console) -> int:
     text = notes(command, drive_map, crane, found, held_out, seas, fresh, rate)
     write_text(folder / "notes.md", text)
     opened.finish()
-    console.print(text, soft_wrap=True)
+    console.print(text)
     console.print(f"written: {folder}")
     return 0
 

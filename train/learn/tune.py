@@ -249,5 +249,5 @@ def main() -> int:
             console.print("interrupted: the trials that ended are kept; the same command goes on from there")
             return 130
         table_of_all = opened.folder / "study.md"
-        console.print(f"best: {best.cells[0]} with {best.parameters}; all trials: {table_of_all}", soft_wrap=True)
+        console.print(f"best: {best.cells[0]} with {best.parameters}; all trials: {table_of_all}")
     return 0

@@ -69,7 +69,7 @@ def main() -> int:
         text = notes(opened.command, options.number, studies)
         write_text(folder / "notes.md", text)
         opened.finish()
-        console.print(text, soft_wrap=True)
+        console.print(text)
         console.print(f"written: {folder}")
     return 0
 

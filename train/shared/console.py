@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
+from typing import Any
 
 from rich.console import Console
 
@@ -20,6 +21,11 @@ class PlainConsole(Console):
 
     def __init__(self) -> None:
         super().__init__(markup=False, emoji=False)
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print, and leave it to the terminal where sentences are broken: a path in a pipe or a file stays whole."""
+        sentences = all(isinstance(each, str) for each in objects)
+        super().print(*objects, **{"soft_wrap": sentences, **options})
 
     def on_broken_pipe(self) -> None:
         """Say no more where nobody reads on, as behind ``| head``, and let the run go on to its files."""

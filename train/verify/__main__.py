@@ -111,7 +111,7 @@ def run_all(
         done = store.get([check.__module__, check.__name__], partial(_timed, check))
         for item in done.checks:
             mark = "ok  " if item.passed else "FAIL"
-            console.print(f"{mark} {item.name}: {item.measured} (bar: {item.bar})", soft_wrap=True, highlight=False)
+            console.print(f"{mark} {item.name}: {item.measured} (bar: {item.bar})", highlight=False)
         console.print(f"     {done.seconds:.1f} s", highlight=False)
         checks += done.checks
     return checks
@@ -191,10 +191,10 @@ def run_case(kind: str, path: Path, options: Options, console: Console) -> None:
     out = None if options.out is None else new_file(options.out, overwrite=options.overwrite)
     result = without_nan(CASE_KINDS[kind](read_toml(path, kind), path.parent))
     if out is None:
-        console.print(json.dumps(result, indent=2, allow_nan=False), soft_wrap=True, highlight=False)
+        console.print(json.dumps(result, indent=2, allow_nan=False), highlight=False)
     else:
         write_json(out, result)
-        console.print(f"result: {out}", soft_wrap=True, highlight=False)
+        console.print(f"result: {out}", highlight=False)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -213,7 +213,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             console.print("interrupted: what is finished is kept; the same command goes on from there")
             return 130
         run.finish()
-        console.print(f"written: {run.folder}", soft_wrap=True, highlight=False)
+        console.print(f"written: {run.folder}", highlight=False)
         return 0 if all(check.passed for check in checks) else 1
 
 

@@ -13,6 +13,7 @@ import pytest
 
 from train.drives import __main__ as drives
 from train.evaluate import __main__ as evaluate
+from train.shared.console import PlainConsole
 
 ROOT = Path(__file__).parents[3]
 FOLDER = "of [/b] and :sea:"
@@ -108,3 +109,10 @@ def test_an_argument_that_is_no_text_is_refused_before_anything_is_written(
         evaluate.main()
     assert "must be text in UTF-8" in capsys.readouterr().err
     assert not any(tmp_path.iterdir())
+
+
+def test_a_sentence_in_a_file_is_one_line_however_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    raw = console("utf-8", monkeypatch)
+    sentence = f"agent: {'/long/folder' * 20} with words " + "after it " * 20 + "ends"
+    PlainConsole().print(sentence, "and a second one", sep="\n")
+    assert raw.getvalue().decode() == f"{sentence}\nand a second one\n"
