@@ -27,6 +27,7 @@ from agents import shipped
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.feedback import Feedback
 from agents.control.inverse_dynamics import InverseDynamics
+from agents.control.lowering import Following
 from agents.control.optimum import CommandSequence, optimise
 from agents.control.predictive import PlanningConfig, PredictiveControl
 from agents.drives import map as drive_map
@@ -96,6 +97,14 @@ class PolicySpec:
     """Name, folder or function that it was chosen by; empty where it was not."""
     digest: str = ""
     """Digest of the file that it comes from, the card's or the module's; empty for what needs none."""
+
+    def policy(self, context: BuildContext) -> Policy:
+        """Build the policy; where the target moves it follows it, unless it is made for that very lift."""
+        policy = self.build(context)
+        if isinstance(policy, DrivePolicy | CommandSequence) or not any(s.target_path for s in context.scenarios):
+            return policy
+        sensors = {Knowledge.SENSORS: context.sensors, Knowledge.NOTHING: context.config.sensors}.get(policy.knows)
+        return Following(policy, sensors)
 
 
 def _drum_still(context: BuildContext) -> Policy:

@@ -16,6 +16,7 @@ SKY_LOW: Colour = (238, 243, 242)
 FAR_WATER: Colour = (98, 160, 184)
 NEAR_WATER: Colour = (26, 104, 140)
 DEEP_WATER: Colour = (8, 38, 62)
+GROUND: Colour = (92, 78, 60)
 FOAM: Colour = (205, 230, 238)
 
 HULL: Colour = (30, 58, 88)

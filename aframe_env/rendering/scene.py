@@ -43,9 +43,11 @@ class Scene:
     load_mass: float
     """kg."""
     weight: float
-    """N."""
+    """Of load and rope, less their buoyancy, N."""
     target_level: float
-    """h."""
+    """h, now."""
+    ground: float
+    """Level of the load's middle when it stands on the seabed, m; -inf where there is none."""
     rope_length: float
     """Unstretched, between drum and load."""
     tension: float
@@ -88,8 +90,9 @@ def scene_of(simulation: Simulation, row: int) -> Scene:
         pulley_heave=float(state[task.PULLEY_HEAVE]),
         load=results[task.LOAD : task.LOAD + 3].copy(),
         load_mass=scenario.load_mass,
-        weight=scenario.weight,
-        target_level=scenario.target_level,
+        weight=scenario.hanging_weight,
+        target_level=float(results[task.TARGET]),
+        ground=scenario.bed_level + 0.5 * scenario.load.height,
         rope_length=float(state[task.ROPE_LENGTH]),
         tension=float(results[task.TENSION]),
         slack=bool(results[task.SLACK] > 0.0),

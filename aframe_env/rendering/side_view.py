@@ -28,6 +28,8 @@ _BELOW: Final = 92.0
 """Height of the part about the load, pixels."""
 _GAP: Final = 18.0
 """Height of the band that stands for the rope left out, pixels."""
+LOAD_SIZE: Final = 30.0
+"""Size of the load's picture, pixels."""
 _NEAR, _FAR = -11.0, 16.0
 """Ends of the sea along y, towards the onlooker and away, m."""
 
@@ -108,6 +110,12 @@ def _draw_depth(canvas: Canvas, box: Box, view: View, scene: Scene, still: Scene
     def level(of: Scene) -> float:
         return target - max(-reach, min(view.scale * of.depth_error, reach))
 
+    # Where the load's lower edge is when it stands on the ground.
+    ground = target - max(view.scale * (scene.ground - scene.target_level), -2.0 * reach) + 0.5 * LOAD_SIZE
+    if ground < top + height:
+        ground = max(ground, top)
+        canvas.box((left, ground, width, top + height - ground), palette.GROUND)
+        canvas.text("seabed", (left + 14.0, min(ground + 12.0, top + height - 8.0)), size=11, colour=palette.PAGE)
     x = min(max(float(view.pixels(scene.load)[0]), left + 24.0), left + width - 24.0)
     place = np.array([x, level(scene)])
     canvas.dashes((left, target), (left + width, target), palette.TARGET, 1.2)
@@ -115,8 +123,8 @@ def _draw_depth(canvas: Canvas, box: Box, view: View, scene: Scene, still: Scene
     if not scene.parted:
         draw_hanging(canvas, place + slope * (place[1] - top), place, scene)
     if still is not None:
-        draw_ghost(canvas, np.array([x, level(still)]), 30.0)
-    draw_load(canvas, place, 30.0)
+        draw_ghost(canvas, np.array([x, level(still)]), LOAD_SIZE)
+    draw_load(canvas, place, LOAD_SIZE)
     label = f"target level {scene.target_level:.1f} m"
     canvas.text(label, (left + 14.0, target - 10.0), size=11, colour=palette.TARGET)
     return place

@@ -45,10 +45,10 @@ class Water:
 
 def water_of(scenario: Scenario) -> Water:
     """Return the waves that move the scenario's ship; flat water where the ship motion has no waves."""
-    motion = scenario.motion
+    motion, water = scenario.motion, scenario.water
     if not isinstance(motion, SeaMotion):
-        nothing = np.zeros(0)
-        return Water(-_FREEBOARD, nothing, np.zeros((0, 2)), nothing, nothing, 0.0)
+        nothing, level = np.zeros(0), -_FREEBOARD if water is None else water.surface_level
+        return Water(level, nothing, np.zeros((0, 2)), nothing, nothing, 0.0)
     waves, vessel = motion.sea.waves(), motion.vessel
     # Ship axes (x forward, y to port, travelling towards `direction`) to the deck's (x aft, y to starboard);
     # phases refer to the vessel's reference point.
@@ -56,4 +56,5 @@ def water_of(scenario: Scenario) -> Water:
     wave_number = -deep[:, None] * np.stack([np.cos(waves.direction), np.sin(waves.direction)], axis=1)
     deck, reference = np.array(vessel.deck_position), np.array(vessel.reference_point)
     at_deck = waves.phase + wave_number @ (deck - reference)[:2]
-    return Water(-float(deck[2]), waves.frequency, wave_number, waves.amplitude, at_deck, scenario.ramp)
+    level = -float(deck[2]) if water is None else water.surface_level
+    return Water(level, waves.frequency, wave_number, waves.amplitude, at_deck, scenario.ramp)

@@ -116,7 +116,8 @@ class Following:
 
     def __post_init__(self) -> None:
         self.name, self.knows = f"{self.policy.name}, following", self.policy.knows
-        if (self.knows is Knowledge.SENSORS) != (self.sensors is not None):
+        seen = self.knows is not Knowledge.NOTHING  # which may be put beside either
+        if seen and (self.knows is Knowledge.SENSORS) != (self.sensors is not None):
             raise InvalidValue(
                 f"sensors = {'None' if self.sensors is None else 'given'}: {self.policy.name} knows "
                 f"{self.knows.value}: must be given to a policy on sensors, and to no other"
@@ -171,7 +172,7 @@ class Following:
         self._drums, self._deviating = WinchModel(len(o), self._period), WinchModel(len(o), self._period)
         self._drums.start(cranes)
         self._deviating.start(cranes)
-        self._radius = self._drums.radius
+        self._radius = self._drum_radius()
 
     def _drum_radius(self) -> FloatArray:
         """Radius (N,) m at which the ropes run off the drums."""

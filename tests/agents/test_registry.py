@@ -1,12 +1,13 @@
 import dataclasses
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
-from aframe_env import InvalidValue, ScenarioDistribution, Sensors
+from aframe_env import InvalidValue, Scenario, ScenarioDistribution, Sea, SeaMotion, Sensors, TargetPath
 from aframe_env.config import TaskConfig
 from agents import load
 from agents.control.expected_waves import ExpectedWaves
@@ -16,7 +17,7 @@ from agents.learned.features import STATE_FEATURES
 from agents.learned.network import Actor
 from agents.policy import Knowledge
 from agents.registry import REGISTRY, BuildContext, FunctionPolicy, choose, choose_all, slug
-from agents.rollout import held_out_scenarios
+from agents.rollout import held_out_scenarios, run
 
 MAP = str(Path(__file__).parents[2] / "results" / "drive-map")
 
@@ -203,3 +204,19 @@ def test_a_folder_without_an_agent_is_refused(tmp_path):
     (tmp_path / "note.json").write_text(json.dumps({}))
     with pytest.raises(InvalidValue, match="no agent in this folder"):
         choose(str(tmp_path))
+
+
+def test_policies_follow_a_target_that_moves() -> None:
+    path = TargetPath.lowering(-20.0, 0.8, start=5.0)
+    sea = SeaMotion(sea=Sea(hs=1.5, tp=9.0))
+    moving = Scenario(motion=sea, load_mass=5e4, target_level=-200.0, ramp=5.0, target_path=path)
+    holding = replace(moving, target_path=None)
+    errors = {}
+    for name in ("drum still", "feed-forward + feedback", "predictive control (state)"):
+        for scenario in (moving, holding):
+            config = TaskConfig(scenario=scenario, observation="sensors")
+            policy = choose(name).policy(BuildContext(scenarios=[scenario], config=config))
+            seen = "state" if policy.knows is Knowledge.STATE else "sensors"
+            errors[name, scenario is moving] = run(policy, [scenario], config.replaced(observation=seen)).rms[0]
+        # On its way the load is held as it is at one level, up to what the corners leave.
+        assert errors[name, True] < 1.2 * errors[name, False] + 0.05

@@ -59,7 +59,7 @@ def begin(options: EpisodeOptions) -> Episode:
         episode_duration=options.start + options.seconds,
     )
     scenario, noise_seed = _drawn(options, config)
-    policy = spec.build(BuildContext(scenarios=[scenario], config=config))
+    policy = spec.policy(BuildContext(scenarios=[scenario], config=config))
     # A single scenario has no sensors of its own.
     seen = config.replaced(observation=observation_of(policy, config))
     return Episode(policy, seen.replaced(observation=seen.sensors or "state"), scenario, noise_seed)

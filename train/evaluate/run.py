@@ -215,7 +215,7 @@ class _Part:
 
     def run(self, spec: PolicySpec, spread: Spread = in_turn, advance: Callable[[], object] = lambda: None) -> _Ran:
         """Build the policy, and run it; ``advance`` is called after each step."""
-        policy = spec.build(BuildContext(scenarios=self.scenarios, config=self.config, spread=spread))
+        policy = spec.policy(BuildContext(scenarios=self.scenarios, config=self.config, spread=spread))
         seen = self.config.replaced(observation=observation_of(policy, self.config))
         episodes = run(policy, self.scenarios, seen, first=self.first, progress=lambda _: advance())
         return _Ran(policy.knows, episodes)
