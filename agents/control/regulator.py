@@ -150,9 +150,12 @@ class HoistBatch:
         k = self.model(gains.damping_ratio).gains(self.efforts(gains.effort))
         return Regulator(k, acceleration / self.frequency**2, acceleration)
 
-    def efforts(self, tuned: float, rows: Rows = ALL) -> FloatArray:
-        """Efforts (n,) s² of a law: the one that was ``tuned``, or what keeps it out of the rope's own waves."""
-        return np.maximum(tuned, self._least_effort[rows])
+    def efforts(self, tuned: float, rows: Rows = ALL, quickest: float = QUICKEST) -> FloatArray:
+        """Efforts (n,) s² of a law: the one that was ``tuned``, or what keeps it out of the rope's own waves.
+
+        ``quickest``: its poles, as a share of the first frequency of these.
+        """
+        return np.maximum(tuned, (QUICKEST / quickest) ** 8 * self._least_effort[rows])
 
     def stretch(self, o: Columns, rows: Rows = ALL) -> FloatArray:
         """Stretch (N,) m of the rope beyond that at rest, as the tension tells."""

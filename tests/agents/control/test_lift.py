@@ -181,3 +181,12 @@ def test_laws_reckon_with_the_layer_that_the_rope_runs_off() -> None:
         task = TaskConfig(observation=observation)
         rms = [float(run(policy, [each], task).rms[0]) for each in (plain, layered)]
         assert rms[1] < 1.3 * rms[0] + 1e-3
+
+
+def test_predictive_control_leaves_the_waves_in_the_rope_alone() -> None:
+    """100 t at 1,500 m: poles nearer to the rope's own waves drove these on, to a decimetre."""
+    shape = LoadShape(volume=12.7, added_mass_vertical=8e4, drag_area_vertical=60.0)
+    sea = SeaMotion(sea=Sea(hs=1.5, tp=9.0, heading=3.0))
+    scenario = replace(at_depth(-1500.0), load_mass=1e5, load=shape, motion=sea, water=Water())
+    config = TaskConfig(observation="sensors", episode_duration=120.0)
+    assert run(PredictiveControl(), [scenario], config).rms[0] < 0.03
