@@ -132,6 +132,13 @@ def test_a_drive_map_for_ones_own_crane(own, tmp_path, monkeypatch):
     np.testing.assert_allclose(load_map(out).ratio.real.mean(axis=(0, 1, 3)), wanted, rtol=0.01)
 
 
+def test_a_file_with_one_scenario_is_one_unless_asked_for_more(own):
+    assert ScenarioOptions(scenarios=own).number == 200
+    own.write_text("load_mass = 40e3\n")
+    assert ScenarioOptions(scenarios=own).number == 1
+    assert ScenarioOptions(scenarios=own, count=5).number == 5
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import ClassVar
 
-from aframe_env.scenario import ScenarioSource
+from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.scenario.file import scenario_source
 from aframe_env.validation import InvalidValue, require_integer
 
@@ -21,7 +21,8 @@ class ScenarioOptions:
     scenarios: int | Path = 200
     """Number of scenarios; or a TOML file with a scenario or a distribution of your own to take them from."""
     count: int | None = None
-    """Number of scenarios of the file that --scenarios names; by default as many as without a file."""
+    """Number of scenarios of the file that --scenarios names; by default one where it says a single one, which is the
+    same sea every time, and else as many as without a file."""
 
     def __post_init__(self) -> None:
         if self.count is not None and not isinstance(self.scenarios, Path):
@@ -35,7 +36,11 @@ class ScenarioOptions:
         """Number of scenarios."""
         if not isinstance(self.scenarios, Path):
             return self.scenarios
-        return type(self).scenarios if self.count is None else self.count  # type: ignore[return-value]
+        if self.count is not None:
+            return self.count
+        if isinstance(self.source, Scenario):
+            return max(1, self.bounds[0])
+        return type(self).scenarios  # type: ignore[return-value]
 
     @cached_property
     def source(self) -> ScenarioSource:
