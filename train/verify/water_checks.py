@@ -26,7 +26,9 @@ from aframe_env.scenario import (
     Water,
     Winch,
 )
+from train.verify.fine_chain import FineChain
 from train.verify.report import Check
+from train.verify.rope_checks import steel_load
 from train.verify.vertical import FloatArray, Lift
 
 PERIOD = 0.1
@@ -252,4 +254,40 @@ def winch() -> Check:
     )
 
 
-CHECKS = (surface, seabed, waves, compensator, winch)
+def _rough(length: float, mass: float, added: float, drag_area: float, amplitude: float, period: float) -> FloatArray:
+    """Load [m] and tension at S [N] here and by many elements, 60 s from rest: (2, 2, T)."""
+    motion, heave = heaving(amplitude, period)
+    scenario = steel_load(length, mass, added, Rope.six_strand(breaking_load=1e8), motion=motion)
+    scenario = replace(scenario, load=replace(scenario.load, drag_area_vertical=drag_area))
+    times, omega = control_steps(60.0), 2.0 * math.pi / period
+    here = track(scenario, np.zeros(len(times)), (at.LOAD_POSITION + 2, at.TENSION))
+    chain = FineChain(scenario, heave, lambda t: omega * amplitude * math.cos(omega * t))
+    return np.array([here, chain.run(times)])
+
+
+def resonance() -> Check:
+    """Check a load at its resonance, which only the drag of the water limits."""
+    here, there = _rough(3000.0, 5e4, 4e4, 40.0, 1.5, 8.0)
+    gap, extent = float(np.abs(here[0] - there[0]).max()), float(np.ptp(there[0]))
+    return Check(
+        name="resonance limited by drag: 3,000 m, 50 t and 40 t of water, heave of 1.5 m at 8 s",
+        bar="load within 0.1 % of its range of 60 elements'",
+        measured=f"{1e3 * gap:.1f} mm of {extent:.1f} m",
+        passed=gap <= 1e-3 * extent,
+    )
+
+
+def snap() -> Check:
+    """Check a light load whose rope goes slack and snaps taut with every wave."""
+    here, there = _rough(1000.0, 2e4, 2e4, 60.0, 3.0, 5.0)
+    gap, extent = float(np.abs(here[0] - there[0]).max()), float(np.ptp(there[0]))
+    peak = float(here[1].max() / there[1].max() - 1.0)
+    return Check(
+        name="slack and snap: 1,000 m, 20 t and 20 t of water, heave of 3 m at 5 s",
+        bar="load within 2 % of its range of 60 elements', greatest tension within 5 %",
+        measured=f"{1e3 * gap:.0f} mm of {extent:.1f} m, {peak:.1%}",
+        passed=gap <= 0.02 * extent and abs(peak) <= 0.05,
+    )
+
+
+CHECKS = (resonance, snap, surface, seabed, waves, compensator, winch)
