@@ -90,10 +90,6 @@ class Study:
         """Heave reductions (N,) of a policy at a depth."""
         return np.asarray(1.0 - self.left(name, depth, transponder).rms / self.left("drum still", depth).rms)
 
-    def best(self, depth: float) -> FloatArray:
-        """RMS (N,) m that the best of all policies leaves, lift by lift."""
-        return np.asarray(np.min([self.left(name, depth).rms for name in self.policies()], axis=0))
-
 
 def _csv(heading: str, rows: Iterable[Sequence[object]]) -> str:
     lines = [",".join(f"{cell:.7g}" if isinstance(cell, float) else str(cell) for cell in row) for row in rows]
@@ -178,7 +174,6 @@ def _errors(study: Study) -> str:
 
     names = ["drum still", *study.policies()]
     rows = [[name, *(cells(study.left(name, depth).rms) for depth in study.depths)] for name in names]
-    rows.append(["the best of all, lift by lift", *(cells(study.best(depth)) for depth in study.depths)])
     return table(["policy", *(f"{depth:,.0f} m" for depth in study.depths)], rows)
 
 

@@ -14,8 +14,11 @@ from agents.rollout import held_out_scenarios, run
 from train.deep_water.lifts import lifts
 from train.evaluate.run import observation_of
 
+CEILING: Final = "S-Ω1 for each scenario, Gauss-Newton"
+"""The paper's spline, found for each lift with its whole future known: what the winch can do."""
 POLICIES: Final = (
     "drum still",
+    CEILING,
     "inverse dynamics",
     "predictive control (state)",
     "feed-forward + feedback (state)",
