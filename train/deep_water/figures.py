@@ -14,7 +14,7 @@ from agents.policy import FloatArray
 from train.deep_water.harmonics import closed_forms, rms_of_heave
 from train.deep_water.notes import Study
 from train.deep_water.passage import bobbing_periods, running
-from train.evaluate.figure import COLOURS, LEAST, TICKS
+from train.evaluate.figure import COLOURS, LEAST
 from train.evaluate.statistics import tail_mean
 from train.shared.run_folder import write_atomically
 
@@ -34,8 +34,8 @@ def draw_zero_shot(path: Path, study: Study) -> None:
             place = np.arange(len(names)) + 0.15 * (1.5 - number)
             axis.plot(np.maximum(left, LEAST), place, "o", ms=5, color=COLOURS[number], label=f"{depth:,.0f} m")
         axis.set_xscale("log")
-        axis.set_xlim(3.0, 3e-4)
-        ticks = [tick for tick in TICKS if tick >= 1e-3]
+        axis.set_xlim(2.0, 0.6 * LEAST)
+        ticks = (1.0, 0.1, 0.03, 0.01, 0.001, LEAST)
         axis.set_xticks(ticks, [f"{100 * (1 - tick):.4g}%" for tick in ticks])
         axis.minorticks_off()
         axis.set_yticks(range(len(names)), names, fontsize=9)
