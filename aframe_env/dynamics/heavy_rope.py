@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.blocks import put_three
-from aframe_env.dynamics.compensator import give, slide_of
+from aframe_env.dynamics.compensator import give
 from aframe_env.dynamics.compiling import fma, larger, scalar, select, smaller
 from aframe_env.dynamics.layout import SPRINGS_MOST, Span
 from aframe_env.dynamics.lift import (
@@ -29,19 +29,15 @@ from aframe_env.dynamics.lift import (
     BELOW,
     COST,
     ELEMENT,
-    GIVEN_RATE,
     GROUND,
-    LENGTH,
     LEVER,
     LOAD_SHARE,
     MASS_LEVER,
     MASS_LEVER_SQUARED,
-    PAY_OUT,
     PEAK,
     SLACKEST,
     SLIDE,
     SPEED,
-    STROKE,
     TOP_LOSS,
     TOP_STIFFNESS,
     Line,
@@ -49,49 +45,11 @@ from aframe_env.dynamics.lift import (
     Rope,
     advance_slot,
     aim,
+    divide,
 )
 from aframe_env.dynamics.wet_load import pull_load
 
 Array = npt.NDArray[np.float64]
-
-
-@scalar
-def divide(row: Array, source: int, end: int, lanes: int, j: int) -> Rope:
-    """Find what all springs of the rope have in common."""
-    # What a compensator gives is paid out as the drum's rope is.
-    length = row[(end + LENGTH) * lanes + j] + row[(source + STROKE) * lanes + j]
-    pay_out = row[(end + PAY_OUT) * lanes + j] + row[(at.STAGE + GIVEN_RATE) * lanes + j]
-    springs, axial = row[at.SPRINGS * lanes + j], row[at.AXIAL_STIFFNESS * lanes + j]
-    drum_part, loss_time = row[at.DRUM_PART * lanes + j], row[at.LOSS_TIME * lanes + j]
-    lumps = springs - 1.0
-    bare = lumps <= 0.0
-    share = 1.0 / select(bare, 1.0, lumps)
-    element = (length - drum_part) * share
-    inverse = 1.0 / element
-    top_length = select(bare, length, fma(0.5, element, drum_part))
-    intact = 1.0 - row[at.PARTED * lanes + j]
-    mass = select(bare, 1.0, row[at.ROPE_MASS * lanes + j] * element)
-    slide = row[at.SHEAVE_FRICTION * lanes + j] * slide_of(row[(end + PAY_OUT) * lanes + j])
-    # A single spring has the constant damping of eq. (26), the elements of a chain their material's.
-    constant = row[at.ROPE_DAMPING * lanes + j] * top_length / axial
-    return Rope(
-        springs,
-        element,
-        inverse,
-        axial * inverse,
-        loss_time,
-        top_length,
-        intact * axial / fma(slide, drum_part, top_length),
-        select(bare, constant, loss_time),
-        -row[at.DRUM_TO_PULLEY * lanes + j],
-        pay_out,
-        pay_out * share,
-        1.0 / mass,
-        1.0 / axial,
-        row[at.ROPE_WEIGHT * lanes + j],
-        row[at.ROPE_DRAG * lanes + j],
-        1.0 + slide,
-    )
 
 
 @scalar

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.blocks import put_three, three
-from aframe_env.dynamics.compiling import fma, scalar
+from aframe_env.dynamics.compiling import fma, scalar, select
 from aframe_env.dynamics.layout import SPRINGS_MOST
 from aframe_env.dynamics.load import RopeEnd
 from aframe_env.dynamics.vector import Vector, difference
@@ -121,6 +121,8 @@ class Pull(NamedTuple):
     mass_lever_rate: float
 
 
+CREEP: Final = 0.02
+"""Speed of the rope at which the pulley's friction is at 70 %, m/s."""
 LOAD_SHARE: Final = 1.0 / 6.0
 """Share of an element's mass that the load carries for the lowest lump."""
 
@@ -179,3 +181,48 @@ def aim(row: Array, source: int, end: int, lanes: int, j: int) -> Line:
     carried = fma(turn.x, pulley_rate.x, fma(turn.y, pulley_rate.y, turn.z * pulley_rate.z))
     squared = fma(turn.x, turn.x, fma(turn.y, turn.y, turn.z * turn.z))
     return Line(axis, turn, away, away_rate, nearness, speed, carried, squared)
+
+
+@scalar
+def slide_of(pay_out: float) -> float:
+    """Way and degree to which the rope slides a pulley round: from -1, paid out, to 1, hauled in [m/s]."""
+    return -pay_out / math.sqrt(fma(pay_out, pay_out, CREEP * CREEP))
+
+
+@scalar
+def divide(row: Array, source: int, end: int, lanes: int, j: int) -> Rope:
+    """Find what all springs of the rope have in common."""
+    # What a compensator gives is paid out as the drum's rope is.
+    length = row[(end + LENGTH) * lanes + j] + row[(source + STROKE) * lanes + j]
+    pay_out = row[(end + PAY_OUT) * lanes + j] + row[(at.STAGE + GIVEN_RATE) * lanes + j]
+    springs, axial = row[at.SPRINGS * lanes + j], row[at.AXIAL_STIFFNESS * lanes + j]
+    drum_part, loss_time = row[at.DRUM_PART * lanes + j], row[at.LOSS_TIME * lanes + j]
+    lumps = springs - 1.0
+    bare = lumps <= 0.0
+    share = 1.0 / select(bare, 1.0, lumps)
+    element = (length - drum_part) * share
+    inverse = 1.0 / element
+    top_length = select(bare, length, fma(0.5, element, drum_part))
+    intact = 1.0 - row[at.PARTED * lanes + j]
+    mass = select(bare, 1.0, row[at.ROPE_MASS * lanes + j] * element)
+    slide = row[at.SHEAVE_FRICTION * lanes + j] * slide_of(row[(end + PAY_OUT) * lanes + j])
+    # A single spring has the constant damping of eq. (26), the elements of a chain their material's.
+    constant = row[at.ROPE_DAMPING * lanes + j] * top_length / axial
+    return Rope(
+        springs,
+        element,
+        inverse,
+        axial * inverse,
+        loss_time,
+        top_length,
+        intact * axial / fma(slide, drum_part, top_length),
+        select(bare, constant, loss_time),
+        -row[at.DRUM_TO_PULLEY * lanes + j],
+        pay_out,
+        pay_out * share,
+        1.0 / mass,
+        1.0 / axial,
+        row[at.ROPE_WEIGHT * lanes + j],
+        row[at.ROPE_DRAG * lanes + j],
+        1.0 + slide,
+    )
