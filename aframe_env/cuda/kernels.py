@@ -10,6 +10,7 @@ from numba import cuda
 
 from aframe_env.cuda.drawing import begin_episode, copy_row, draw_lift, draw_motion
 from aframe_env.dynamics import layout as at
+from aframe_env.dynamics.compiling import scalar
 from aframe_env.dynamics.layout import LANES, Span
 from aframe_env.dynamics.random import draw_seed
 from aframe_env.dynamics.step import control_step, lane_control_step
@@ -17,6 +18,24 @@ from aframe_env.scenario import NUMBERS
 from aframe_env.task import charge_parted, clip_row, read_out
 
 Array = Any
+
+
+@scalar
+def tell(
+    row: Array,
+    i: int,
+    j: int,
+    episode_duration: float,
+    state: Array,
+    results: Array,
+    low: Array,
+    high: Array,
+    observation: Array,
+) -> None:
+    """Read row i out, lane j of its block, once it has made a step."""
+    charge_parted(row, episode_duration, LANES, j)
+    read_out(row, LANES, j, state, results, i)
+    clip_row(state, low, high, observation, i)
 
 
 def advance(
@@ -38,9 +57,7 @@ def advance(
         row = blocks[cuda.blockIdx.x]
         row[at.COMMAND * LANES + j] = actions[i, 0]
         control_step(row, room, segments, records, Span(LANES, j, j + 1))
-        charge_parted(row, episode_duration, LANES, j)
-        read_out(row, LANES, j, state, results, i)
-        clip_row(state, low, high, observation, i)
+        tell(row, i, j, episode_duration, state, results, low, high, observation)
 
 
 def advance_any(
@@ -62,9 +79,7 @@ def advance_any(
         row = blocks[cuda.blockIdx.x]
         row[at.COMMAND * LANES + j] = actions[i, 0]
         lane_control_step(row, room, segments, records, Span(LANES, j, j + 1))
-        charge_parted(row, episode_duration, LANES, j)
-        read_out(row, LANES, j, state, results, i)
-        clip_row(state, low, high, observation, i)
+        tell(row, i, j, episode_duration, state, results, low, high, observation)
 
 
 def repeat(
