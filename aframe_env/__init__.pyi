@@ -9,6 +9,7 @@ from .scenario.scenario import Scenario
 from .scenario.sea import Sea, SeaMotion
 from .scenario.sensors import Channel, Sensors
 from .scenario.target import TargetPath
+from .scenario.told import Told
 from .scenario.vessel import Vessel
 from .scenario.water import LoadShape, Seabed, Water
 from .validation import (
@@ -49,6 +50,7 @@ __all__ = [
     "SmallRotationWarning",
     "TargetPath",
     "TaskConfig",
+    "Told",
     "Vessel",
     "Water",
     "Winch",

@@ -75,12 +75,15 @@ class TaskConfig:
 
     @property
     def sensors(self) -> Sensors | None:
-        """Sensors that measure the observation; None where the full state is observed."""
+        """Sensors that measure the observation, as they are told; None where the full state is observed."""
         if isinstance(self.observation, Sensors):
             return self.observation
         if self.observation == "state":
             return None
-        return self.source.sensors if isinstance(self.source, ScenarioDistribution) else Sensors()
+        if isinstance(self.source, ScenarioDistribution):
+            return self.source.sensors
+        delay = self.source.as_told.sensor_delay
+        return Sensors() if delay is None else Sensors(delay=delay)
 
     @property
     def nominal(self) -> Scenario:

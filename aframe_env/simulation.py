@@ -57,6 +57,8 @@ class Simulation:
         limit = np.float32(self.source.crane.winch.max_speed)
         self.action_space = spaces.Box(-limit, limit, (1,), np.float32)
         self.scenarios: list[Scenario | None] = [None] * rows
+        self._told_mass = np.zeros(rows)
+        """Masses of the loads that the operator was told, kg."""
         self.steps = np.zeros(rows, dtype=np.int64)
         self._everything = np.arange(rows)
         self.state = np.zeros((rows, len(task.STATE)))
@@ -102,13 +104,13 @@ class Simulation:
         """Put rows at the start of their scenarios."""
         for index, (scenario, _) in zip(indices.tolist(), drawn, strict=True):
             self._engine.reset_row(index, scenario)
-            self.scenarios[index] = scenario
+            self._begin(index, scenario)
         self.steps[indices] = 0
         self._read_out(indices)
         if self._bank is not None:
             truth = self._sensed_truth()
-            for index, (_, noise_seed) in zip(indices.tolist(), drawn, strict=True):
-                self._bank.reset_row(index, truth[index], noise_seed)
+            for index, (scenario, noise_seed) in zip(indices.tolist(), drawn, strict=True):
+                self._bank.reset_row(index, truth[index], noise_seed, scenario.sensor_delay)
 
     def advance(self, commands: FloatArray) -> None:
         """Advance every row by one control step; ``commands`` (rows,) rad/s, finite."""
@@ -120,8 +122,10 @@ class Simulation:
 
     def observe(self) -> npt.NDArray[np.float32]:
         """Return a fresh observation of every row: (rows, K)."""
-        values = self.state
-        if self._bank is not None:
+        if self._bank is None:
+            values = self.state.copy()
+            values[:, task.LOAD_MASS] = self._told_mass
+        else:
             values = np.concatenate([self._bank.readings, self._known()], axis=1)
         observation = np.empty(values.shape, dtype=np.float32)
         task.clip(values, self._low, self._high, observation)
@@ -144,19 +148,24 @@ class Simulation:
                 "set_state(): the state belongs to an environment with another model, rfes or rfem_modes"
             )
         self._engine.restore_row(index, state.engine, state.scenario)
-        self.scenarios[index] = state.scenario
+        self._begin(index, state.scenario)
         self.steps[index] = state.step
         if self._bank is not None and state.sensors is not None:
-            self._bank.write_row(index, state.sensors)
+            self._bank.write_row(index, state.sensors, state.scenario.sensor_delay)
         self._read_out(np.array([index]))
 
     def _read_out(self, rows: npt.NDArray[np.int64]) -> None:
         self._report(self._engine.blocks, self.episode_duration, rows, self.state, self.results)
 
+    def _begin(self, index: int, scenario: Scenario) -> None:
+        """Note the scenario of a row."""
+        self.scenarios[index] = scenario
+        self._told_mass[index] = scenario.as_told.load_mass
+
     def _known(self) -> FloatArray:
         """Mass, if it is told, and nominal unstretched rope length: known before the lift, (rows, 2)."""
         assert self.config.sensors is not None
-        mass = self._engine.read(at.MASS) * self.config.sensors.mass_told
+        mass = self._told_mass * self.config.sensors.mass_told
         return np.stack([mass, self._engine.read(at.START_LENGTH)], axis=1)
 
     def _sensed_truth(self) -> FloatArray:

@@ -61,7 +61,7 @@ class BuildContext:
     """Task that a policy is built for."""
 
     scenarios: Sequence[Scenario]
-    """Scenarios that it will run in. Only a policy that knows the future may look at their seas."""
+    """True scenarios that it will run in. Only a policy that knows the future may look at them."""
     config: TaskConfig
     """The task; its observation is what a policy sees that is not made for another."""
     spread: Spread = in_turn
@@ -70,7 +70,7 @@ class BuildContext:
     @property
     def nominal(self) -> Scenario:
         """Scenario that a policy that knows no more than the clock may be tuned for."""
-        return self.config.nominal
+        return self.config.nominal.as_told
 
     @property
     def sensors(self) -> Sensors:

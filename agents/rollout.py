@@ -15,7 +15,7 @@ from aframe_env.dynamics import layout as at
 from aframe_env.memory import require_memory
 from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.simulation import Simulation
-from agents.policy import FloatArray, Policy
+from agents.policy import FloatArray, Policy, begin
 
 HELD_OUT_SEED = 20_091_123
 """Scenarios for evaluation are drawn from this seed and their number. Training never draws from it."""
@@ -127,7 +127,7 @@ def run(
     simulation = Simulation(rows, config)
     seeds = noise_seeds(noise_seed, first + rows)[first:]
     simulation.reset_rows(np.arange(rows), list(zip(scenarios, seeds, strict=True)))
-    policy.reset(scenarios, config.control_period)
+    begin(policy, scenarios, config.control_period)
     steps = simulation.episode_steps
     tally = _Tally(simulation, scenarios)
     for step in range(steps):

@@ -34,7 +34,7 @@ from aframe_env.simulation import Simulation
 from aframe_env.validation import InvalidValue, require_integer, require_number
 from agents.control.feed_forward import PartialFeedForward
 from agents.learned.agent import LearnedPolicy
-from agents.policy import DrumStill, Policy
+from agents.policy import DrumStill, Policy, begin
 from agents.registry import BuildContext, PolicySpec, as_spec, choose, slug
 from train.evaluate.run import observation_of
 from train.shared.cli import parse
@@ -236,7 +236,7 @@ def record(
 ) -> list[Recording]:
     """Run a policy to the episodes' ends; ``noise`` (steps, N) rad/s is added to its actions."""
     steps, rows, period = simulation.episode_steps, simulation.rows, simulation.control_period
-    policy.reset([each for each in simulation.scenarios if each is not None], period)
+    begin(policy, [each for each in simulation.scenarios if each is not None], period)
     space = simulation.action_space
     seen, infos = [simulation.observe()], [_infos(simulation)]
     actions, rewards = np.empty((steps, rows, 1), dtype=np.float32), np.empty((steps, rows))

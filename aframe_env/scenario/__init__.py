@@ -9,6 +9,7 @@ from aframe_env.scenario.scenario import Initial, Scenario
 from aframe_env.scenario.sea import Sea, SeaMotion
 from aframe_env.scenario.sensors import Channel, Sensors
 from aframe_env.scenario.target import TargetPath
+from aframe_env.scenario.told import Told
 from aframe_env.scenario.vessel import Vessel
 from aframe_env.scenario.water import LoadShape, Seabed, Water
 
@@ -38,6 +39,7 @@ __all__ = [
     "Sensors",
     "ShipMotion",
     "TargetPath",
+    "Told",
     "Vessel",
     "Water",
     "Winch",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Final, Literal
 
@@ -11,6 +11,7 @@ from aframe_env.dynamics.start import heavy_lengths, longest_chain_step, springs
 from aframe_env.scenario.crane import GRAVITY, Crane
 from aframe_env.scenario.motion import HarmonicMotion, ShipMotion, has_components, is_tabled
 from aframe_env.scenario.target import TargetPath
+from aframe_env.scenario.told import Told
 from aframe_env.scenario.water import LoadShape, Water
 from aframe_env.validation import InvalidValue, require_choice, require_instance, require_number, shown
 
@@ -60,6 +61,10 @@ class Scenario:
     """What the water feels of the load."""
     target_path: TargetPath | None = None
     """Path of the target from ``target_level`` on; None: it holds."""
+    sensor_delay: float | None = None
+    """Time from a motion to its reading, s, in the place of the sensors' own; None: theirs."""
+    told: Told | None = None
+    """What the operator was told where that is not what is; None: he was told all of it truly."""
 
     def __post_init__(self) -> None:
         require_instance("crane", self.crane, Crane)
@@ -108,6 +113,31 @@ class Scenario:
                 f"with a load of {self.load_mass:g} kg"
             )
         self._require_chain()
+        if self.sensor_delay is not None:
+            require_number("sensor_delay", self.sensor_delay, "s", low=0.0, high=10.0)
+        if self.told is not None:
+            require_instance("told", self.told, Told)
+            try:
+                self.as_told  # noqa: B018 - refuse now what could not be, were it so
+            except InvalidValue as error:
+                raise InvalidValue(f"told: {error}") from None
+
+    @cached_property
+    def as_told(self) -> Scenario:
+        """The scenario as the operator was told it: all that a policy may know, unless it is privileged.
+
+        This very scenario where nothing that was told differs. Target and ``free_length``, which the rope counter
+        reads, are the true ones.
+        """
+        if self.told is None:
+            return self
+        crane, lift = self.told.of(self.crane), self.told.differences(self, "load_mass", "load", "sensor_delay")
+        if crane is self.crane and not lift:
+            return self
+        told = replace(self, told=None, crane=crane, **lift)
+        # With the numbers told another length would hold the load at its target; the counter reads what is paid out.
+        told.__dict__["free_length"] = self.free_length
+        return told
 
     @property
     def target_levels(self) -> tuple[float, float]:

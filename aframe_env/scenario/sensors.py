@@ -117,24 +117,25 @@ class SensorBank:
         )
         self._hold = np.array([max(1, round(c.period / control_period)) for c in channels], dtype=np.int64)
         self._resolution = np.array([c.resolution for c in channels])
-        # A reading is the truth `delay` ago, interpolated between the control steps on either side.
-        delays = np.array([sensors.delay + c.delay for c in channels]) / control_period
-        self._whole = np.floor(delays + 1e-9).astype(np.int64)
-        self._weight = np.clip(delays - self._whole, 0.0, 1.0)
-        past = int(self._whole.max()) + 2
-        require_memory(
-            f"num_envs = {rows} with sensors that are {delays.max() * control_period:g} s late",
-            8 * rows * past * len(CHANNELS),
-        )
-        self._memory = np.zeros((rows, past, len(CHANNELS)))
+        self._period, self._delay = control_period, sensors.delay
+        self._further_delay = np.array([c.delay for c in channels])
+        # A reading is the truth of its delay ago, interpolated between the control steps on either side.
+        self._whole = np.zeros((rows, len(CHANNELS)), dtype=np.int64)
+        self._weight = np.zeros((rows, len(CHANNELS)))
+        self._memory = np.zeros((rows, 0, len(CHANNELS)))
         """(rows, past control steps with the newest first, channels)."""
+        self._set_delay(slice(None), None)
         self._error = np.zeros((rows, len(CHANNELS)))
         self._reading = np.zeros((rows, len(CHANNELS)))
         self._seed = np.zeros(rows, dtype=np.uint64)
         self._count = np.zeros(rows, dtype=np.int64)
 
-    def reset_row(self, index: int, truth: FloatArray, seed: int) -> None:
-        """Start a row that has been at ``truth`` (channels,) for ever, with its own noise."""
+    def reset_row(self, index: int, truth: FloatArray, seed: int, delay: float | None = None) -> None:
+        """Start a row that has been at ``truth`` (channels,) for ever, with its own noise.
+
+        ``delay``: from a motion to its reading, s, in the place of the sensors'.
+        """
+        self._set_delay(index, delay)
         self._memory[index] = truth
         self._error[index] = 0.0
         self._seed[index] = seed
@@ -163,16 +164,38 @@ class SensorBank:
             int(self._count[index]),
         )
 
-    def write_row(self, index: int, state: tuple[FloatArray, FloatArray, FloatArray, int, int]) -> None:
-        """Put back what ``copy_row`` returned."""
-        self._memory[index], self._error[index], self._reading[index] = state[:3]
+    def write_row(
+        self, index: int, state: tuple[FloatArray, FloatArray, FloatArray, int, int], delay: float | None = None
+    ) -> None:
+        """Put back what ``copy_row`` returned of a row with this ``delay``, as in ``reset_row``."""
+        self._set_delay(index, delay)
+        memory, self._error[index], self._reading[index] = state[:3]
+        # What lies further back than either bank's rows are late is never looked at.
+        past = min(len(memory), self._memory.shape[1])
+        self._memory[index, :past] = memory[:past]
         self._seed[index], self._count[index] = state[3:]
+
+    def _set_delay(self, index: int | slice, delay: float | None) -> None:
+        """Let the readings of a row, or of some, be so late, s, and all memories be long enough."""
+        delays = ((self._delay if delay is None else delay) + self._further_delay) / self._period
+        self._whole[index] = np.floor(delays + 1e-9)
+        self._weight[index] = np.clip(delays - self._whole[index], 0.0, 1.0)
+        rows, past, channels = self._memory.shape
+        needed = int(self._whole[index].max()) + 2
+        if needed > past:
+            require_memory(
+                f"num_envs = {rows} with sensors that are {delays.max() * self._period:g} s late",
+                8 * rows * needed * channels,
+            )
+            longer = np.zeros((rows, needed, channels))
+            longer[:, :past] = self._memory
+            self._memory = longer
 
     def _measure(self, rows: slice) -> None:
         _read_kernel()(
             self._memory[rows],
-            self._whole,
-            self._weight,
+            self._whole[rows],
+            self._weight[rows],
             self._noise,
             self._relative,
             self._keep,
@@ -200,8 +223,8 @@ def _read_kernel():  # type: ignore[no-untyped-def]
                 else:
                     error[i, c] = keep[c] * error[i, c] + fresh * draw
                 if count[i] % hold[c] == 0:
-                    newer, older = memory[i, whole[c], c], memory[i, whole[c] + 1, c]
-                    truth = (1.0 - weight[c]) * newer + weight[c] * older
+                    newer, older = memory[i, whole[i, c], c], memory[i, whole[i, c] + 1, c]
+                    truth = (1.0 - weight[i, c]) * newer + weight[i, c] * older
                     value = truth + error[i, c] * max(noise[c], relative[c] * abs(truth))
                     if resolution[c] > 0.0:
                         value = round(value / resolution[c]) * resolution[c]

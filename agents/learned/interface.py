@@ -16,9 +16,9 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from aframe_env.scenario import Scenario
 from aframe_env.validation import require_choice, require_known, require_number
 from agents.control.filters import ALL, FloatArray, Rows
-from agents.control.lift import Lift
 from agents.control.regulator import Observation
 from agents.learned.feature_sets import features_for
 from agents.learned.features import ACTIONS, STATE_FEATURES, Action, FeatureConfig, Features
@@ -101,12 +101,18 @@ class LearnerFeatures:
         self.values = np.zeros((rows, len(self.names)), dtype=np.float32)
         """The present features (N, F), in place."""
 
-    def start(self, observation: Observation, state: FloatArray, lifts: Sequence[Lift], rows: Rows = ALL) -> None:
-        """Begin episodes in these ``rows`` of n, from observations (n, K) and full states (n, 14)."""
-        self.values[rows, : self.actor_inputs] = self._features.start(observation, lifts, rows)
+    def start(
+        self, observation: Observation, state: FloatArray, scenarios: Sequence[Scenario], rows: Rows = ALL
+    ) -> None:
+        """Begin episodes in these ``rows`` of n, from observations (n, K) and full states (n, 14).
+
+        The agent's features are for the scenarios as told, those for critics for the true ones.
+        """
+        told = [scenario.as_told for scenario in scenarios]
+        self.values[rows, : self.actor_inputs] = self._features.start(observation, told, rows)
         if self._privileged:
             seen = state.astype(np.float32)
-            self.values[rows, self.actor_inputs :] = self._privileged.start(seen, lifts, rows)
+            self.values[rows, self.actor_inputs :] = self._privileged.start(seen, scenarios, rows)
 
     def advance(self, observation: Observation, state: FloatArray) -> None:
         """Take the observations (N, K) and full states (N, 14) of all rows, one control step later."""

@@ -217,8 +217,8 @@ def _begin(
     rows: npt.NDArray[np.int64],
 ) -> None:
     """Begin episodes in these ``rows`` of n, whose first observations are (n, K)."""
-    lifts = [scenario for row in rows.tolist() if (scenario := simulation.scenarios[row]) is not None]
-    features.start(observation, simulation.state[rows], lifts, rows)
+    scenarios = [scenario for row in rows.tolist() if (scenario := simulation.scenarios[row]) is not None]
+    features.start(observation, simulation.state[rows], scenarios, rows)
     cuts.start(rows)
 
 

@@ -27,6 +27,7 @@ from aframe_env import (
     Seabed,
     Sensors,
     TargetPath,
+    Told,
     Vessel,
     Water,
     Winch,
@@ -54,12 +55,13 @@ TABLES = {
     Material: "`[crane.frame.structure.material]`:",
     Servomotor: "`[crane.frame.structure.servomotor]`:",
     TargetPath: "## `[target_path]`",
+    Told: "## `[told]`",
     Water: "## `[water]`",
     Seabed: "`[water.seabed]`:",
     Compensator: "`[crane.compensator]`:",
     LoadShape: "`[load]`:",
 }
-ELSEWHERE = {"crane", "motion", "water", "load", "target_path"}
+ELSEWHERE = {"crane", "motion", "water", "load", "target_path", "told"}
 """Keys of a scenario that have sections of their own."""
 
 

@@ -13,7 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aframe_env import Channel, InvalidValue, Scenario, ScenarioDistribution, Sensors
+from aframe_env.env import AFrameHeaveEnv
 from aframe_env.scenario.sensors import CHANNELS, SensorBank
+from aframe_env.task import PULLEY_VELOCITY_Z
 
 PERIOD = 0.1
 FloatArray = npt.NDArray[np.float64]
@@ -176,3 +178,35 @@ def test_transponder_takes_the_sounds_time() -> None:
     assert Sensors.transponder(0.0, delay=0.2).delay == 0.2
     with pytest.raises(InvalidValue, match="depth = -3"):
         Sensors.transponder(-3.0)
+
+
+def test_rows_may_be_late_by_delays_of_their_own():
+    late, own, longer = (SensorBank(Sensors(delay=d), 1, 0.1) for d in (0.1, 0.25, 0.43))
+    bank = SensorBank(Sensors(delay=0.1), 3, 0.1)
+    truth = np.random.default_rng(0).normal(size=(30, len(CHANNELS)))
+    for alone, index, delay in ((late, 0, None), (own, 1, 0.25), (longer, 2, 0.43)):
+        alone.reset_row(0, truth[0], seed=5)
+        bank.reset_row(index, truth[0], seed=5, delay=delay)
+    for step, now in enumerate(truth[1:]):
+        if step == 10:
+            # One that has gone on for some time, in a bank that has never had a row so late.
+            other = SensorBank(Sensors(delay=0.1), 1, 0.1)
+            other.write_row(0, bank.copy_row(2), delay=0.43)
+        together = bank.measure(np.tile(now, (3, 1)))
+        apart = [alone.measure(now[None])[0] for alone in (late, own, longer)]
+        assert np.array_equal(together, apart)
+        if step >= 10:
+            assert np.array_equal(other.measure(now[None])[0], apart[2])
+    assert not np.array_equal(together[0], together[2])
+
+
+def test_a_scenario_may_have_a_delay_of_its_own():
+    late = Scenario(sensor_delay=0.3)
+    sensors = Sensors.ideal()
+    env = AFrameHeaveEnv(scenario=late, observation=sensors)
+    env.reset(seed=0)
+    pulley, readings = [], []
+    for _ in range(20):
+        readings.append(env.step(np.ones(1, dtype=np.float32))[0][1])
+        pulley.append(env.simulation.state[0, PULLEY_VELOCITY_Z])
+    assert readings[5:] == pytest.approx(pulley[2:-3], abs=1e-6)

@@ -20,6 +20,7 @@ from aframe_env.scenario import Scenario
 from aframe_env.simulation import Simulation
 from aframe_env.task import OMEGA1, SENSED, STATE, Quantity
 from agents.learned.agent import LearnedPolicy
+from agents.policy import begin
 from agents.rollout import noise_seeds, run
 from train.export.interface import crane_values, readings_of, told_of
 from train.export.session import Session
@@ -52,11 +53,11 @@ class Lifts:
     def __init__(self, agent: LearnedPolicy, scenarios: Sequence[Scenario]) -> None:
         card = agent.card
         for scenario in scenarios:
-            scenario.require_light("exported controllers")
+            scenario.as_told.require_light("exported controllers")
         quantities: tuple[Quantity, ...] = STATE if card.sensors is None else SENSED
         self._places = {quantity.name: place for place, quantity in enumerate(quantities)}
         self._read, self._told = readings_of(card).names, told_of(card).names
-        self._cranes = [crane_values(scenario.crane) for scenario in scenarios]
+        self._cranes = [crane_values(scenario.as_told.crane) for scenario in scenarios]
 
     def readings(self, observation: npt.NDArray[np.float32]) -> FloatArray:
         """Readings (N, R) of an observation (N, K)."""
@@ -91,7 +92,7 @@ def check(agent: LearnedPolicy, model: Path, scenarios: Sequence[Scenario], *, n
     states = [np.zeros(session.state_size) for _ in scenarios]
     onlookers = (agent.exact(), agent)
     for onlooker in onlookers:
-        onlooker.reset(scenarios, card.control_period)
+        begin(onlooker, scenarios, card.control_period)
     differences = np.empty((2, simulation.episode_steps, rows))
     for step in range(simulation.episode_steps):
         observation = simulation.observe()

@@ -159,13 +159,13 @@ class TrainingVecEnv(VecEnv):
 
     def _restart(self, rows: npt.NDArray[np.int64]) -> None:
         drawn = self._draw(rows)
-        lifts = [scenario for scenario, _ in drawn]
+        scenarios = [scenario for scenario, _ in drawn]
         simulation = self._simulation
         simulation.reset_rows(rows, drawn)
         self._cuts.start(rows)
         self._return[rows] = 0.0
         self._length[rows] = 0
-        self._features.start(simulation.observe()[rows], simulation.state[rows], lifts, rows)
+        self._features.start(simulation.observe()[rows], simulation.state[rows], scenarios, rows)
 
     def _draw(self, rows: npt.NDArray[np.int64]) -> list[tuple[Scenario, int]]:
         """Scenarios for these rows, and seeds of their noise."""

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from aframe_env.scenario import Scenario
 from aframe_env.task import SENSED, STATE
-from agents.policy import FloatArray, Knowledge, Policy
+from agents.policy import FloatArray, Knowledge, Policy, begin
 
 OPEN_LOOP = (Knowledge.NOTHING, Knowledge.CLOCK, Knowledge.FUTURE)
 
@@ -37,7 +37,7 @@ class Misinformed:
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes; the true scenarios are not passed on."""
         told = self._assumed if self._open_loop else [self._assumed[i] for i in self._which.tolist()]
-        self._policy.reset(told, control_period)
+        begin(self._policy, told, control_period)
 
     def act(self, observation: npt.NDArray[np.float32], time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s."""

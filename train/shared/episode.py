@@ -12,7 +12,7 @@ from aframe_env.rendering.history import History
 from aframe_env.rendering.scene import Scene, scene_of
 from aframe_env.scenario import Scenario
 from aframe_env.simulation import Simulation
-from agents.policy import Policy
+from agents.policy import Policy, begin
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -37,7 +37,7 @@ class Episode:
         self.on_sensors = config.sensors is not None
         self._simulation = Simulation(2, config.replaced(scenario=scenario))
         self._simulation.reset_rows(np.arange(2), [(scenario, noise_seed)] * 2)
-        policy.reset([scenario], config.control_period)
+        begin(policy, [scenario], config.control_period)
         self._history = History(config.control_period)
         self._history.record(self._simulation)
         self._before = self._now = self._moment()
