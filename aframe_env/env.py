@@ -48,9 +48,9 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
 
     ## Action space
     `Box(-w, w, (1,), float32)`: commanded angular velocity of the drum, rad/s; positive pays out. w is the winch's
-    limit (4 rad/s, that is 3 m/s of rope, for the reference crane). The drum follows the command within its limits
-    of acceleration (2 m/s² of rope) and its lag; the observation has the actual speed. At the least and greatest
-    paid-out length the limit switches stop the drum.
+    limit (4 rad/s, that is 3 m/s of rope, for the reference crane); where winches are drawn, that of the fastest. The
+    drum follows the command within its limits of speed and acceleration (2 m/s² of rope) and its lag; the observation
+    has the actual speed. At the least and greatest paid-out length the limit switches stop the drum.
 
     ## Observation space
     `observation="state"` (default), `Box(14,) float32`, values beyond a range are clipped to it:
@@ -67,7 +67,7 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     | 9 | φ_H | drum angle, from the start | rad | ±1e5 |
     | 10 | φ'_H | actual drum speed | rad/s | ±1e3 |
     | 11 | T | rope tension, on the drum's side of the pulley | N | 0 ... 1e8 |
-    | 12 | m_L | mass of the load, in air | kg | 0 ... 1e7 |
+    | 12 | m_L | mass of the load, in air, as told | kg | 0 ... 1e7 |
     | 13 | l | unstretched rope length between drum and load | m | 0 ... 1e5 |
 
     `observation="sensors"`, or a `Sensors` of your own, `Box(10,) float32`: what instruments read, with noise, delay,
@@ -82,7 +82,7 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     | 5 | drum speed | rad/s | ±1e3 |
     | 6 | rope tension on the drum's side of the pulley, by a load pin | N | ±1e8 |
     | 7 | depth error of the load, by a transponder or from the rope: slow and coarse | m | ±1e3 |
-    | 8 | mass of the load, in air | kg | 0 ... 1e7 |
+    | 8 | mass of the load, in air, as told | kg | 0 ... 1e7 |
     | 9 | unstretched rope length at the start | m | 0 ... 1e5 |
 
     ## Reward
@@ -182,7 +182,7 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
 
     @property
     def scenario(self) -> Scenario:
-        """The present episode's scenario."""
+        """The present episode's scenario, the true one; what a policy may know is its ``as_told``."""
         scenario = self._simulation.scenarios[0]
         if scenario is None:
             raise gymnasium.error.ResetNeeded("no scenario before the first reset()")

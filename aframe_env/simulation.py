@@ -54,7 +54,7 @@ class Simulation:
         self._bank = SensorBank(config.sensors, rows, self.control_period) if config.sensors else None
         self.observation_space = task.box(config.quantities)
         self._low, self._high = self.observation_space.low, self.observation_space.high
-        limit = np.float32(self.source.crane.winch.max_speed)
+        limit = np.float32(self.source.max_drum_speed)
         self.action_space = spaces.Box(-limit, limit, (1,), np.float32)
         self.scenarios: list[Scenario | None] = [None] * rows
         self._told_mass = np.zeros(rows)

@@ -106,7 +106,7 @@ class AFrameHeaveVectorEnv(VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.flo
 
     @property
     def scenarios(self) -> tuple[Scenario | None, ...]:
-        """The rows' present scenarios."""
+        """The rows' present scenarios, the true ones; what a policy may know is their ``as_told``."""
         return tuple(self._simulation.scenarios)
 
     @property  # type: ignore[misc]

@@ -19,6 +19,7 @@ from aframe_env.engine import Engine
 from aframe_env.scenario import Scenario, ScenarioDistribution, ScenarioSource
 from aframe_env.scenario.motion import has_components
 from aframe_env.simulation import Simulation
+from aframe_env.validation import InvalidValue
 
 
 class CudaRows:
@@ -33,6 +34,12 @@ class CudaRows:
         source = host.source
         if not isinstance(source, Scenario):
             source.nominal().require_light("scenarios drawn on a CUDA device")
+            source.require_known_crane("scenarios drawn on a CUDA device")
+        elif source.as_told.load_mass != source.load_mass:
+            raise InvalidValue(
+                f"told: load_mass = {source.as_told.load_mass!r} kg: rows on a CUDA device observe the true mass: must "
+                f"be {source.load_mass!r} kg"
+            )
         self._components = _count_components(source)
         self._kernels = kernels()
         self._advance = self._kernels.advance if host.config.nominal.is_light else self._kernels.advance_any

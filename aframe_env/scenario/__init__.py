@@ -1,7 +1,8 @@
 """Scenarios: crane, ship motion, sea, vessel, sensors and load of an episode; fixed, drawn, or read from a file."""
 
 from aframe_env.scenario.crane import GRAVITY, Compensator, Crane, Frame, Rope, Winch
-from aframe_env.scenario.distribution import NUMBERS, Range, ScenarioDistribution, ScenarioSource
+from aframe_env.scenario.distribution import NUMBERS, ScenarioDistribution, ScenarioSource
+from aframe_env.scenario.interval import Range
 from aframe_env.scenario.loads import LOADS, ReadyLoad
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion, ShipMotion
 from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow

@@ -11,52 +11,50 @@ import numpy as np
 
 from aframe_env.dynamics.start import LIGHT_ROPE, SHORT_ROPE, critical_damping, heavy_lengths
 from aframe_env.scenario.crane import GRAVITY, Crane
+from aframe_env.scenario.interval import Range, factor, highest, require_range, uniform_of, within
 from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
 from aframe_env.scenario.scenario import LEAST_MASS, LEAST_RAMP, Scenario
 from aframe_env.scenario.sea import FULL_TURN, Sea, SeaMotion, dnv_gamma
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.scenario.target import TargetPath
+from aframe_env.scenario.told import Told
 from aframe_env.scenario.vessel import Vessel
 from aframe_env.scenario.water import LoadShape, Water
 from aframe_env.validation import InvalidValue, require_instance, require_integer, require_number, shown
 
-Range = float | tuple[float, float]
-"""One exact value, or the interval that a value is drawn from uniformly."""
-
 SUBSTREAM: Final = 8
-"""Numbers that sea, load and rope each take from the generator, however many they need."""
+"""Numbers that sea, load and rope each take from the generator, however many they need. Each has its place: what is
+drawn more leaves what was drawn before as it was."""
 FASTEST_CURRENT: Final = 5.0
 """Greatest speed of a drawn current, m/s."""
 NUMBERS: Final = 3 * SUBSTREAM
 """Random numbers that a scenario is drawn with."""
 
 
-def _require_range(name: str, value: Any, unit: str, low: float, high: float, low_open: bool = False) -> None:
-    if isinstance(value, tuple):
-        if len(value) != 2:
-            raise InvalidValue(f"{name} = {shown(value)}: must be a number or a tuple (low, high) in {unit}")
-        for part, item in zip(("low", "high"), value, strict=True):
-            require_number(f"{name} ({part})", item, unit, low=low, high=high, low_open=low_open)
-        if value[0] > value[1]:
-            raise InvalidValue(f"{name} = {shown(value)} {unit}".rstrip() + ": the low end is above the high end")
-    elif isinstance(value, list):
-        raise InvalidValue(f"{name} = {shown(value)}: must be a number or a tuple (low, high) in {unit}")
-    else:
-        require_number(name, value, unit, low=low, high=high, low_open=low_open)
-
-
-def _highest(value: Range) -> float:
-    return value[1] if isinstance(value, tuple) else value
-
-
-def _draw(value: Range, uniform: float) -> float:
-    return value[0] + (value[1] - value[0]) * uniform if isinstance(value, tuple) else value
-
-
-def _uniform(value: Range, drawn: float) -> float:
-    """The number in [0, 1] at which ``_draw`` is nearest to what is ``drawn``."""
-    low, high = value if isinstance(value, tuple) else (value, value)
-    return min(max((drawn - low) / (high - low), 0.0), 1.0) if high > low else 0.0
+_WET: Final = (
+    "added_mass_factor",
+    "drag_factor",
+    "current_factor",
+    "current_turn",
+    "told_added_mass_error",
+    "told_drag_error",
+)
+"""What goes with water."""
+_CRANE: Final = {
+    "axial_stiffness": ("N", 1.0, 1e12),
+    "max_rope_speed": ("m/s", 1e-6, 1e3),
+    "max_rope_acceleration": ("m/s²", 1e-6, 1e6),
+    "lag": ("s", 0.0, 1e4),
+    "sensor_delay": ("s", 0.0, 10.0),
+}
+"""What may be drawn of crane and sensors: unit, least and greatest value."""
+_ERRORS: Final = {
+    "told_mass_error": "load_mass",
+    "told_stiffness_error": "axial_stiffness",
+    "told_added_mass_error": "load",
+    "told_drag_error": "load",
+}
+"""What is told with an error, and what it then is told of."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,19 +111,39 @@ class ScenarioDistribution:
     """What the velocities of the water's current are multiplied by."""
     current_turn: Range = 0.0
     """Angle that the current is turned by, from x to y, rad."""
+    axial_stiffness: Range | None = None
+    """Of the rope, N; None: the crane's."""
+    max_rope_speed: Range | None = None
+    """Of the winch, m/s; None: the crane's."""
+    max_rope_acceleration: Range | None = None
+    """Of the winch, m/s²; None: the crane's."""
+    lag: Range | None = None
+    """Of the winch, s; None: the crane's."""
+    sensor_delay: Range | None = None
+    """Time from a motion to its reading, s; the operator is told that of ``sensors``. None: that is true."""
+    told: Told | None = None
+    """What the operator is told in every scenario, whatever is drawn; None: the truth, but for the errors below."""
+    told_mass_error: float = 0.0
+    """The load's mass is told wrongly by up to ± this share of it."""
+    told_stiffness_error: float = 0.0
+    """And so is the rope's axial stiffness."""
+    told_added_mass_error: float = 0.0
+    """And so are the load's added masses."""
+    told_drag_error: float = 0.0
+    """And so are its drag areas."""
 
     def __post_init__(self) -> None:
-        _require_range("hs", self.hs, "m", 0.0, 30.0)
-        _require_range("tp", self.tp, "s", 2.0, 40.0)
-        _require_range("heading", self.heading, "rad", -FULL_TURN, FULL_TURN)
+        require_range("hs", self.hs, "m", 0.0, 30.0)
+        require_range("tp", self.tp, "s", 2.0, 40.0)
+        require_range("heading", self.heading, "rad", -FULL_TURN, FULL_TURN)
         if not isinstance(self.gamma, str):
-            _require_range("gamma", self.gamma, "", 1.0, 10.0)
+            require_range("gamma", self.gamma, "", 1.0, 10.0)
         elif self.gamma != "dnv":
             raise InvalidValue(f"gamma = {shown(self.gamma)}: must be 'dnv', a number or a tuple in [1, 10]")
         require_number("ramp", self.ramp, "s", low=LEAST_RAMP, high=1e4, or_zero=True)
-        _require_range("load_mass", self.load_mass, "kg", LEAST_MASS, 1e7)
-        _require_range("rope_length", self.rope_length, "m", 0.0, 1e5, low_open=True)
-        _require_range("rope_damping_ratio", self.rope_damping_ratio, "of critical", 0.0, 1.0)
+        require_range("load_mass", self.load_mass, "kg", LEAST_MASS, 1e7)
+        require_range("rope_length", self.rope_length, "m", 0.0, 1e5, low_open=True)
+        require_range("rope_damping_ratio", self.rope_damping_ratio, "of critical", 0.0, 1.0)
         require_integer("components", self.components, low=1, high=4096)
         require_instance("crane", self.crane, Crane)
         require_instance("sensors", self.sensors, Sensors)
@@ -134,6 +152,7 @@ class ScenarioDistribution:
         if self.target_path is not None:
             require_instance("target_path", self.target_path, TargetPath)
         self._require_water()
+        self._require_crane_and_told()
         self._require_records()
         self._require_rope()
         # The corners of the distribution must be scenarios: refuse now rather than in the middle of a run.
@@ -147,23 +166,24 @@ class ScenarioDistribution:
 
         That of the shortest rope which is a chain, with the greatest damping and the heaviest load beside which it is.
         """
-        rope, load, length = self.crane.rope, np.ones(SUBSTREAM), np.ones(SUBSTREAM)
-        load[0] = _uniform(self.load_mass, (1.0 - 1e-9) * SHORT_ROPE * rope.mass_per_length / LIGHT_ROPE)
+        load, length = np.ones(SUBSTREAM), np.ones(SUBSTREAM)
+        rope = self._crane(length).rope
+        load[0] = uniform_of(self.load_mass, (1.0 - 1e-9) * SHORT_ROPE * rope.mass_per_length / LIGHT_ROPE)
         # In air, where it is stretched more: in water the very shortest is a hair longer.
-        pull = (_draw(self.load_mass, float(load[0])) + 0.5 * rope.mass_per_length * SHORT_ROPE) * GRAVITY
-        length[0] = _uniform(self.rope_length, SHORT_ROPE * (1.0 + pull / rope.axial_stiffness))
+        pull = (within(self.load_mass, float(load[0])) + 0.5 * rope.mass_per_length * SHORT_ROPE) * GRAVITY
+        length[0] = uniform_of(self.rope_length, SHORT_ROPE * (1.0 + pull / rope.axial_stiffness))
         return load, load, length
 
     def _require_water(self) -> None:
         """Raise where water, current and what is drawn of them do not go together."""
-        _require_range("added_mass_factor", self.added_mass_factor, "", 0.0, 100.0)
-        _require_range("drag_factor", self.drag_factor, "", 0.0, 100.0)
-        _require_range("current_factor", self.current_factor, "", 0.0, 100.0)
-        _require_range("current_turn", self.current_turn, "rad", -FULL_TURN, FULL_TURN)
+        require_range("added_mass_factor", self.added_mass_factor, "", 0.0, 100.0)
+        require_range("drag_factor", self.drag_factor, "", 0.0, 100.0)
+        require_range("current_factor", self.current_factor, "", 0.0, 100.0)
+        require_range("current_turn", self.current_turn, "rad", -FULL_TURN, FULL_TURN)
         if self.water is not None:
             require_instance("water", self.water, Water)
         current = () if self.water is None else self.water.current
-        for name in ("added_mass_factor", "drag_factor", "current_factor", "current_turn"):
+        for name in _WET:
             value = getattr(self, name)
             if value == getattr(ScenarioDistribution, name):
                 continue
@@ -171,13 +191,30 @@ class ScenarioDistribution:
                 raise InvalidValue(f"{name} = {shown(value)}: goes with water, and there is none")
             if name.startswith("current") and not current:
                 raise InvalidValue(f"{name} = {shown(value)}: goes with a current, and the water has none")
-        speed = max((math.hypot(x, y) for _, x, y in current), default=0.0) * _highest(self.current_factor)
+        speed = max((math.hypot(x, y) for _, x, y in current), default=0.0) * highest(self.current_factor)
         drawn = self.current_factor != 1.0 or self.current_turn != 0.0
         if drawn and speed > FASTEST_CURRENT:
             raise InvalidValue(
                 f"current_factor = {shown(self.current_factor)}: the current would run at {speed:g} m/s: must be at "
                 f"most {FASTEST_CURRENT:g} m/s"
             )
+
+    def _require_crane_and_told(self) -> None:
+        """Raise where what is drawn of crane, sensors and what is told is out of range."""
+        for name, (unit, low, high) in _CRANE.items():
+            value = getattr(self, name)
+            if value is not None:
+                require_range(name, value, unit, low, high)
+        if self.told is not None:
+            require_instance("told", self.told, Told)
+            if self.told.sensor_delay is not None:
+                raise InvalidValue(
+                    f"told: sensor_delay = {self.told.sensor_delay!r} s: must be None, for the delay of sensors is told"
+                )
+        for name, told in _ERRORS.items():
+            require_number(name, getattr(self, name), "", low=0.0, high=0.9)
+            if getattr(self, name) and getattr(self.told, told, None) is not None:
+                raise InvalidValue(f"{name} = {getattr(self, name)!r}: must be 0 where told has a {told}")
 
     def _require_records(self) -> None:
         """Raise where a record is none, or shorter than the stretch that is drawn from it, or a sea is given beside."""
@@ -225,6 +262,21 @@ class ScenarioDistribution:
     def _is_light(self) -> bool:
         return self.water is None and not self.crane.rope.mass_per_length
 
+    @property
+    def max_drum_speed(self) -> float:
+        """Speed limit of the fastest winch, rad/s."""
+        return self._crane(np.ones(SUBSTREAM)).winch.max_speed
+
+    def require_known_crane(self, what: str) -> None:
+        """Raise where cranes, or what is told of them, differ: ``what`` takes one crane that is told truly."""
+        for name in (*_CRANE, "told", *_ERRORS):
+            value = getattr(self, name)
+            if value != getattr(ScenarioDistribution, name):
+                raise InvalidValue(
+                    f"{name} = {shown(value)}: {what} take one crane for all, and what is told is true: must be "
+                    f"{getattr(ScenarioDistribution, name)}"
+                )
+
     def draw(self, rng: np.random.Generator) -> Scenario:
         """Draw one scenario."""
         return self.at(rng.random(NUMBERS))
@@ -242,31 +294,64 @@ class ScenarioDistribution:
 
     def _build(self, u_sea: np.ndarray, u_load: np.ndarray, u_rope: np.ndarray) -> Scenario:
         m, r = u_load.tolist(), u_rope.tolist()
-        load_mass, rope_length = _draw(self.load_mass, m[0]), _draw(self.rope_length, r[0])
-        ratio = _draw(self.rope_damping_ratio, r[1])
+        load_mass, rope_length = within(self.load_mass, m[0]), within(self.rope_length, r[0])
+        ratio = within(self.rope_damping_ratio, r[1])
         weight = load_mass * GRAVITY
-        stiffness = self.crane.rope.axial_stiffness / self.crane.free_length(rope_length, weight)
+        crane = self._crane(u_rope)
+        stiffness = crane.rope.axial_stiffness / crane.free_length(rope_length, weight)
+        factors = within(self.added_mass_factor, m[1]), within(self.drag_factor, m[2])
         scenario = Scenario(
-            crane=self.crane,
+            crane=crane,
             motion=self._window(u_sea) if self.records else self._sea_motion(u_sea),
             load_mass=load_mass,
-            target_level=self.crane.pulley_position[2] - rope_length,
+            target_level=crane.pulley_position[2] - rope_length,
             rope_damping=ratio * critical_damping(stiffness, load_mass) if self._is_light else 0.0,
             ramp=self.ramp,
             target_path=self.target_path,
             water=self._water(u_sea),
-            load=self._shape(load_mass, _draw(self.added_mass_factor, m[1]), _draw(self.drag_factor, m[2])),
+            load=self._shape(load_mass, *factors),
+            sensor_delay=None if self.sensor_delay is None else within(self.sensor_delay, float(u_sea[7])),
+            told=self._told(m, r, load_mass, crane, factors),
         )
         if self._is_light:
             return scenario
         damping = ratio * critical_damping(scenario.rope_stiffness, scenario.moved_mass)
         return replace(scenario, rope_damping=damping) if damping else scenario
 
+    def _crane(self, u_rope: np.ndarray) -> Crane:
+        """The crane with the rope and winch that are drawn."""
+        drawn = {
+            name: within(value, float(u_rope[place]))
+            for name, place in (("axial_stiffness", 2), ("max_rope_speed", 4), ("max_rope_acceleration", 5), ("lag", 6))
+            if (value := getattr(self, name)) is not None
+        }
+        if not drawn:
+            return self.crane
+        stiffness = drawn.pop("axial_stiffness", self.crane.rope.axial_stiffness)
+        rope = replace(self.crane.rope, axial_stiffness=stiffness)
+        return replace(self.crane, rope=rope, winch=replace(self.crane.winch, **drawn))
+
+    def _told(
+        self, m: list[float], r: list[float], load_mass: float, crane: Crane, factors: tuple[float, float]
+    ) -> Told | None:
+        """What the operator is told of a load and a crane that are drawn."""
+        told: dict[str, Any] = {}
+        if self.told_mass_error:
+            told["load_mass"] = load_mass * factor(self.told_mass_error, m[3])
+        if self.told_stiffness_error:
+            told["axial_stiffness"] = crane.rope.axial_stiffness * factor(self.told_stiffness_error, r[3])
+        if self.told_added_mass_error or self.told_drag_error:
+            added = factors[0] * factor(self.told_added_mass_error, m[4])
+            told["load"] = self._shape(load_mass, added, factors[1] * factor(self.told_drag_error, m[5]))
+        if self.sensor_delay is not None:
+            told["sensor_delay"] = self.sensors.delay
+        return replace(self.told or Told(), **told) if told else self.told
+
     def _shape(self, load_mass: float, added_mass_factor: float, drag_factor: float) -> LoadShape:
         """Shape of a load of this mass."""
         if self.load == LoadShape():
             return self.load
-        size = load_mass / _draw(self.load_mass, 0.5)
+        size = load_mass / within(self.load_mass, 0.5)
         added, area = size * added_mass_factor, size ** (2.0 / 3.0) * drag_factor
         return LoadShape(
             volume=size * self.load.volume,
@@ -283,7 +368,7 @@ class ScenarioDistribution:
         """The water with the current that is drawn."""
         if self.water is None or not self.water.current:
             return self.water
-        factor, turn = _draw(self.current_factor, float(u_sea[5])), _draw(self.current_turn, float(u_sea[6]))
+        factor, turn = within(self.current_factor, float(u_sea[5])), within(self.current_turn, float(u_sea[6]))
         if factor == 1.0 and turn == 0.0:
             return self.water
         c, s = factor * math.cos(turn), factor * math.sin(turn)
@@ -300,12 +385,12 @@ class ScenarioDistribution:
 
     def _sea_motion(self, u_sea: np.ndarray) -> SeaMotion:
         s = u_sea.tolist()
-        hs, tp = _draw(self.hs, s[0]), _draw(self.tp, s[1])
-        gamma = dnv_gamma(hs, tp) if self.gamma == "dnv" else _draw(self.gamma, s[3])
+        hs, tp = within(self.hs, s[0]), within(self.tp, s[1])
+        gamma = dnv_gamma(hs, tp) if self.gamma == "dnv" else within(self.gamma, s[3])
         sea = Sea(
             hs=hs,
             tp=tp,
-            heading=_draw(self.heading, s[2]),
+            heading=within(self.heading, s[2]),
             spectrum=self.spectrum,
             gamma=gamma,
             spreading=self.spreading,

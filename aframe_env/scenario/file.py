@@ -42,7 +42,8 @@ from aframe_env.scenario.cross_sections import (
     StressPoint,
     Tube,
 )
-from aframe_env.scenario.distribution import Range, ScenarioDistribution, ScenarioSource
+from aframe_env.scenario.distribution import ScenarioDistribution, ScenarioSource
+from aframe_env.scenario.interval import Range
 from aframe_env.scenario.loads import ready_load
 from aframe_env.scenario.motion import HarmonicMotion, ShipMotion
 from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
@@ -50,6 +51,7 @@ from aframe_env.scenario.scenario import Scenario
 from aframe_env.scenario.sea import Sea, SeaMotion
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.scenario.target import TargetPath
+from aframe_env.scenario.told import Told
 from aframe_env.scenario.vessel import Vessel
 from aframe_env.scenario.water import LoadShape, Water
 from aframe_env.serialization import plain, strict_converter, structure
@@ -181,6 +183,9 @@ def _converter(folder: Path) -> Converter:
             return converter.structure(value, tuple[float, float])
         return converter.structure(value, float)
 
+    def interval_or_none(value: Any, _: Any) -> Range | None:
+        return None if value is None else interval(value, None)
+
     def peak_enhancement(value: Any, _: Any) -> Range | str:
         return value if isinstance(value, str) else interval(value, None)
 
@@ -196,6 +201,7 @@ def _converter(folder: Path) -> Converter:
     converter.register_structure_hook_func(lambda kind: kind == ShipMotion, motion)
     converter.register_unstructure_hook(SeaMotion, lambda m: _sea_table(m, converter))
     converter.register_structure_hook_func(lambda kind: kind == Range, interval)
+    converter.register_structure_hook_func(lambda kind: kind == Range | None, interval_or_none)
     converter.register_structure_hook_func(lambda kind: kind == Range | str, peak_enhancement)
     converter.register_unstructure_hook(RecordedMotion, _recorded_table)
     converter.register_unstructure_hook(RecordedWindow, lambda m: _recorded_table(m.record, m.start, m.duration))
@@ -273,6 +279,16 @@ class _Distribution:
     current_factor: Range = ScenarioDistribution.current_factor
     current_turn: Range = ScenarioDistribution.current_turn
     target_path: TargetPath | None = None
+    axial_stiffness: Range | None = None
+    max_rope_speed: Range | None = None
+    max_rope_acceleration: Range | None = None
+    lag: Range | None = None
+    sensor_delay: Range | None = None
+    told: Told | None = None
+    told_mass_error: float = ScenarioDistribution.told_mass_error
+    told_stiffness_error: float = ScenarioDistribution.told_stiffness_error
+    told_added_mass_error: float = ScenarioDistribution.told_added_mass_error
+    told_drag_error: float = ScenarioDistribution.told_drag_error
 
 
 def _distribution(table: _Distribution, folder: Path, source: str) -> ScenarioDistribution:

@@ -140,6 +140,11 @@ class Scenario:
         return told
 
     @property
+    def max_drum_speed(self) -> float:
+        """Speed limit of the drum, rad/s."""
+        return self.crane.winch.max_speed
+
+    @property
     def target_levels(self) -> tuple[float, float]:
         """Lowest and highest level of the target, m."""
         low, high = (0.0, 0.0) if self.target_path is None else self.target_path.changes

@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 import torch
 
-from aframe_env import Crane, InvalidValue, Rope, ScenarioDistribution
+from aframe_env import Crane, InvalidValue, Rope, Scenario, ScenarioDistribution, Told
 from aframe_env.config import TaskConfig
+from aframe_env.scenario import ScenarioSource
 from aframe_env.simulation import Simulation
 
 pytest.importorskip("tensordict", reason='tensordict is not installed (extra "cuda")')
@@ -72,6 +73,27 @@ def test_ropes_with_mass_are_not_drawn_on_a_device() -> None:
     host = Simulation(1, TaskConfig(scenario=ScenarioDistribution(crane=Crane(rope=Rope.six_strand()))))
     with pytest.raises(InvalidValue, match=r"mass_per_length = 19\.55 kg/m.*drawn on a CUDA device"):
         CudaRows(host, 1, torch.device("cpu"))
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        (
+            ScenarioDistribution(lag=(0.0, 0.3)),
+            r"lag = \(0\.0, 0\.3\): scenarios drawn on a CUDA device",
+        ),
+        (ScenarioDistribution(told_mass_error=0.2), "told_mass_error = 0.2: scenarios drawn on a CUDA device"),
+        (
+            Scenario(told=Told(load_mass=5e4)),
+            "told: load_mass = 50000.0 kg: rows on a CUDA device",
+        ),
+    ],
+)
+def test_what_is_told_wrongly_does_not_come_to_a_device(source: ScenarioSource, words: str) -> None:
+    from aframe_env.cuda.rows import CudaRows
+
+    with pytest.raises(InvalidValue, match=words):
+        CudaRows(Simulation(1, TaskConfig(scenario=source)), 1, torch.device("cpu"))
 
 
 def test_the_compiler_accepts_the_kernels(monkeypatch: pytest.MonkeyPatch) -> None:

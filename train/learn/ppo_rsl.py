@@ -22,6 +22,7 @@ from tensordict import TensorDict
 from torch import nn
 
 from aframe_env.cuda.device import open_device
+from aframe_env.scenario import ScenarioDistribution
 from aframe_env.torch_env import GROUP, AFrameHeaveTorchEnv
 from aframe_env.validation import InvalidValue, require_integer
 from agents.learned.network import Actor
@@ -210,7 +211,9 @@ def build(options: Options) -> Learner:
     env = AFrameHeaveTorchEnv(options.n_envs, config, device=options.device, seed=options.seed)
     rows = TrainingRows(
         env,
-        TensorFeatures(env.num_envs, config.source.crane, options.features, env.device, cuda=options.device == "cuda"),
+        TensorFeatures(
+            env.num_envs, config.nominal.as_told.crane, options.features, env.device, cuda=options.device == "cuda"
+        ),
         drift_limit=options.drift_limit,
         reward_scale=options.reward_scale,
         reward_knee=options.reward_knee,
@@ -222,6 +225,8 @@ def build(options: Options) -> Learner:
 def check(options: Options) -> None:
     """Raise unless there is the device that is asked for, and the ropes are such as it takes."""
     options.config.nominal.require_light("features of tensors")
+    if isinstance(options.config.source, ScenarioDistribution):
+        options.config.source.require_known_crane("features of tensors")
     if options.device == "cuda":
         open_device("cuda")
 

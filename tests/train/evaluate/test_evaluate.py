@@ -71,3 +71,29 @@ def test_bad_options_are_one_clear_line(arguments, words, tmp_path, monkeypatch,
     assert stopped.value.code == 2
     assert words in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+SPY = """
+from pathlib import Path
+import numpy as np
+from agents.policy import Knowledge
+
+class Spy:
+    name, knows = "spy", Knowledge.SENSORS
+
+    def reset(self, scenarios, control_period):
+        self.handed = {scenario.load_mass for scenario in scenarios}
+
+    def act(self, observation, time):
+        Path("seen.txt").write_text(f"{self.handed} {set(observation[:, 8].tolist())}")
+        return np.zeros(len(observation))
+"""
+
+
+def test_the_comparison_keeps_the_truth_from_a_policy_that_looks_for_it(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("spy.py").write_text(SPY, encoding="utf-8")
+    Path("wrong.toml").write_text("load_mass = 60e3\n[told]\nload_mass = 50e3\n", encoding="utf-8")
+    few = ("--scenarios", "wrong.toml", "--count", 2, "--workers", 1, "--no-report", "--out", tmp_path / "out")
+    assert command(monkeypatch, "--policies", "spy:Spy", *few) == 0
+    assert Path("seen.txt").read_text() == "{50000.0} {50000.0}"
