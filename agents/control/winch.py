@@ -24,8 +24,8 @@ class WinchModel:
     """The winches of N rows, without their limit switches: commands for wanted turns, and reckoned drum speeds."""
 
     def __init__(self, rows: int, control_period: float) -> None:
-        self.radius, self.max_speed, self.max_acceleration, self._lag = np.ones((4, rows))
-        """(N,) m, rad/s, rad/s²."""
+        self.radius, self.max_speed, self.max_acceleration, self.lag = np.ones((4, rows))
+        """(N,) m, rad/s, rad/s², s."""
         self._period = control_period
         self.speed = np.zeros(rows)
         """(N,) rad/s, reckoned from the commands since the start; a lift begins with the drum at rest."""
@@ -36,7 +36,7 @@ class WinchModel:
         self.radius[rows] = [w.drum_radius for w in winches]
         self.max_speed[rows] = [w.max_speed for w in winches]
         self.max_acceleration[rows] = [w.max_acceleration for w in winches]
-        self._lag[rows] = [w.lag for w in winches]
+        self.lag[rows] = [w.lag for w in winches]
         self.speed[rows] = 0.0
 
     def command(self, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -50,7 +50,7 @@ class WinchModel:
     def invert(self, turn: FloatArray) -> FloatArray:
         """Find commands (N,) rad/s that would turn the drums by ``turn`` (N,) rad, or as near as may be."""
         command = np.empty_like(turn)
-        _kernels().invert(self.speed, self.max_speed, self.max_acceleration, self._lag, self._period, turn, command)
+        _kernels().invert(self.speed, self.max_speed, self.max_acceleration, self.lag, self._period, turn, command)
         return command
 
     def reach(self, speed: FloatArray) -> FloatArray:
@@ -59,14 +59,14 @@ class WinchModel:
         The reckoned speed is carried to the end of the control step.
         """
         command = np.empty_like(speed)
-        _kernels().reach(self.speed, self.max_speed, self.max_acceleration, self._lag, self._period, speed, command)
+        _kernels().reach(self.speed, self.max_speed, self.max_acceleration, self.lag, self._period, speed, command)
         return command
 
     def turn(self, command: FloatArray) -> FloatArray:
         """Find turns (N,) rad of the drums at these commands (N,) rad/s, and carry the reckoned speed on."""
         turned = np.empty_like(command)
         limited = np.clip(command, -self.max_speed, self.max_speed)
-        _kernels().follow(self.speed, self.max_acceleration, self._lag, self._period, limited, turned)
+        _kernels().follow(self.speed, self.max_acceleration, self.lag, self._period, limited, turned)
         return turned
 
 

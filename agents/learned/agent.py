@@ -23,7 +23,7 @@ from agents import cards, shipped
 from agents.control.expected_waves import ExpectedWaves
 from agents.learned.feature_policy import OnFeatures
 from agents.learned.feature_sets import feature_names
-from agents.learned.features import Action, FeatureConfig
+from agents.learned.features import WINCH_FEATURES, Action, FeatureConfig
 from agents.learned.network import Actor
 from agents.policy import FloatArray, Knowledge
 
@@ -63,7 +63,11 @@ class AgentCard:
     def made_for(self) -> FeatureConfig:
         """What its features are made for."""
         return FeatureConfig(
-            control_period=self.control_period, sensors=self.sensors, waves=self.waves, action=self.action
+            control_period=self.control_period,
+            sensors=self.sensors,
+            waves=self.waves,
+            action=self.action,
+            winch=self.action != "predictive" and WINCH_FEATURES[-1] in self.features,
         )
 
 

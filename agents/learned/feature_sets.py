@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from agents.learned.features import SENSED_FEATURES, STATE_FEATURES, FeatureConfig, Features
+from agents.learned.features import FeatureConfig, Features
 from agents.learned.plan_features import PLAN_FEATURES, PlanFeatures
 
 
@@ -10,7 +10,7 @@ def feature_names(config: FeatureConfig) -> tuple[str, ...]:
     """Names of the features."""
     if config.action == "predictive":
         return PLAN_FEATURES
-    return STATE_FEATURES if config.sensors is None else SENSED_FEATURES
+    return config.names
 
 
 def features_for(rows: int, config: FeatureConfig) -> Features | PlanFeatures:

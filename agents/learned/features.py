@@ -22,12 +22,13 @@ from aframe_env.config import TaskConfig
 from aframe_env.scenario import ScenarioDistribution
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
-from aframe_env.validation import require_choice
+from aframe_env.validation import InvalidValue, require_choice
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import ALL, FloatArray, Rows
 from agents.control.lift import Lift
 from agents.control.observer import observer_for
 from agents.control.regulator import Columns, HoistBatch, Observation
+from agents.control.winch import WinchModel
 
 Float32Array = npt.NDArray[np.float32]
 Action = Literal["residual", "speed", "predictive"]
@@ -59,6 +60,8 @@ SENSED_FEATURES: Final = (
     "pulley_acceleration_after_that",
     *STATE_FEATURES[7:],
 )
+WINCH_FEATURES: Final = ("winch_speed", "winch_acceleration", "winch_lag")
+"""Limits and lag of the winch, as the operator was told them, for agents that are to meet many winches."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,19 +77,34 @@ class FeatureConfig:
     action: Action = "residual"
     """"residual": the output moves the rope's end, above a feed-forward that follows the pulley; "speed": it is the
     drum's speed, as a share of the winch's; "predictive": it corrects what predictive control plans."""
+    winch: bool = False
+    """Append ``WINCH_FEATURES``, for winches that differ; the features of predictive control have its limits anyway."""
 
     def __post_init__(self) -> None:
-        require_choice("action", self.action, ACTIONS)
+        require_action(self.action, self.winch)
 
     @classmethod
-    def of(cls, task: TaskConfig, action: Action = "residual") -> FeatureConfig:
+    def of(cls, task: TaskConfig, action: Action = "residual", *, winch: bool = False) -> FeatureConfig:
         """For the agents of a task."""
         return cls(
             control_period=task.control_period,
             sensors=task.sensors,
             waves=ExpectedWaves.of(task.source),
             action=action,
+            winch=winch,
         )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the features for the residual and the speed action."""
+        return (STATE_FEATURES if self.sensors is None else SENSED_FEATURES) + WINCH_FEATURES * self.winch
+
+
+def require_action(action: Action, winch: bool) -> None:
+    """Raise where there is no such action, or it does not go with the ``winch`` as features."""
+    require_choice("action", action, ACTIONS)
+    if winch and action == "predictive":
+        raise InvalidValue("winch = True: the features of predictive control have its limits already: must be False")
 
 
 class Features:
@@ -94,8 +112,8 @@ class Features:
 
     def __init__(self, rows: int, config: FeatureConfig) -> None:
         self.rows = rows
-        self._action = config.action
-        self.names = STATE_FEATURES if config.sensors is None else SENSED_FEATURES
+        self._action, self._winch = config.action, config.winch
+        self.names = config.names
         self._hoists = HoistBatch(rows, config.control_period, STATE if config.sensors is None else SENSED)
         self._observer = observer_for(self._hoists, DAMPING_RATIO, config.sensors, config.waves)
         self._rise, self._turned = np.zeros((2, rows))
@@ -152,6 +170,8 @@ class Features:
             *(each[rows] for each in accelerations),
             *lift_features(o["pulley_heave"], hoists.mass[rows], o["rope_length"], hoists.frequency[rows]),
         )
+        if self._winch:
+            features += tuple(each[rows] for each in winch_features(hoists.winch))
         return np.asarray(np.clip(np.stack(features, axis=1), -LIMIT, LIMIT), dtype=np.float32)
 
 
@@ -173,6 +193,11 @@ def load_features(xp: Any, z: Any) -> tuple[Any, ...]:
 def lift_features(pulley_heave: Any, mass: Any, rope_length: Any, frequency: Any) -> tuple[Any, ...]:
     """The last features, not clipped yet; ``frequency`` of the loads' bobbing, rad/s."""
     return 0.5 * pulley_heave, mass / 5.0e4 - 1.2, rope_length / 1.0e3 - 0.8, 0.25 * frequency - 1.0
+
+
+def winch_features(winch: WinchModel) -> tuple[FloatArray, ...]:
+    """``WINCH_FEATURES``, not clipped yet."""
+    return 0.5 * winch.radius * winch.max_speed, winch.radius * winch.max_acceleration, 5.0 * winch.lag
 
 
 def wanted_turn(xp: Any, rise: Any, output: Any, radius: Any, max_acceleration: Any, period: float) -> Any:

@@ -21,7 +21,7 @@ from aframe_env.validation import require_choice, require_known, require_number
 from agents.control.filters import ALL, FloatArray, Rows
 from agents.control.regulator import Observation
 from agents.learned.feature_sets import features_for
-from agents.learned.features import ACTIONS, STATE_FEATURES, Action, FeatureConfig, Features
+from agents.learned.features import STATE_FEATURES, Action, FeatureConfig, Features, require_action
 
 Float32Array = npt.NDArray[np.float32]
 
@@ -47,11 +47,13 @@ class InterfaceConfig:
     horizon: float = 30.0
     """An episode is truncated after this time, s, or with the environment's own, if that is shorter; infinite for
     none."""
+    winch: bool = False
+    """As in ``FeatureConfig``."""
     privileged: bool = False
     """Append, where sensors are observed, the features of the full state, for critics alone."""
 
     def __post_init__(self) -> None:
-        require_choice("action", self.action, ACTIONS)
+        require_action(self.action, self.winch)
         require_choice("reward", self.reward, REWARDS)
         require_number("reward_scale", self.reward_scale, "1/m", low=0.0, high=1e6, low_open=True)
         if self.reward_knee != math.inf:
@@ -90,7 +92,9 @@ class LearnerFeatures:
         """``privileged``: as in ``InterfaceConfig``."""
         self._features = features_for(rows, config)
         self._privileged = (
-            Features(rows, replace(config, sensors=None, action="residual")) if privileged and config.sensors else None
+            Features(rows, replace(config, sensors=None, action="residual", winch=False))
+            if privileged and config.sensors
+            else None
         )
         self.actor_inputs = len(self._features.names)
         """Number of features that are the agent's, the first ones."""

@@ -29,6 +29,8 @@ class TensorFeatures:
             raise InvalidValue("sensors: the features of tensors must be of the full state")
         if config.action == "predictive":
             raise InvalidValue(f"action = {config.action!r}: no such plans are made for tensors")
+        if config.winch:
+            raise InvalidValue("winch = True: rows of tensors have one winch for all: must be False")
         self._crane, self._period, self._action = crane, config.control_period, config.action
         self._invert: _Invert
         if cuda:

@@ -58,6 +58,11 @@ def exportable(name: str) -> LearnedPolicy:
             f"agent = {name!r}: corrects predictive control, which solves a quadratic programme at every step and does "
             "not go into ONNX; export one with the residual action, as aframe export ppo-sensors"
         )
+    if agent.card.made_for.winch:
+        raise InvalidValue(
+            f"agent = {name!r}: has limits and lag of the winch among its features, which exported controllers do not "
+            "take: must be trained with --no-winch"
+        )
     return agent
 
 

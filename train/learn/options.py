@@ -9,7 +9,7 @@ from typing import Literal
 
 from aframe_env.config import TaskConfig
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
-from agents.learned.features import ACTIONS, Action, FeatureConfig
+from agents.learned.features import Action, FeatureConfig
 from agents.learned.interface import InterfaceConfig, LearnerFeatures
 from train.evaluate.run import HeldOut
 from train.shared.jobs import Where
@@ -35,6 +35,8 @@ class LearningOptions(RunOptions, Where):
     action: Action = "residual"
     """What the network's output is: "residual" moves the rope's end, above a hand-written feed-forward that follows the
     pulley; "speed" is the drum's speed, with nothing below it; "predictive" corrects what predictive control plans."""
+    winch: bool = False
+    """Tell the agent limits and lag of the winch, for scenarios in which they differ."""
     practice: int = 0
     """Learn from so many scenarios, in half of which the winch saturates, again and again, by the share of the heave
     that is left in each; the critic is told their waves to come. 0: from new scenarios as the task draws them."""
@@ -88,7 +90,6 @@ class LearningOptions(RunOptions, Where):
         require_integer("seed", self.seed, low=0, high=2**32 - 1)
         require_integer("seeds", self.seeds, low=1, high=10_000)
         require_choice("observation", self.observation, ("state", "sensors"))
-        require_choice("action", self.action, ACTIONS)
         require_integer("practice", self.practice, low=0, high=10**6)
         require_integer("selected_by", self.selected_by, low=0, high=10**5)
         require_number("control_period", self.control_period, "s", low=0.01, high=2.0)
@@ -117,7 +118,7 @@ class LearningOptions(RunOptions, Where):
     @cached_property
     def features(self) -> FeatureConfig:
         """What the agent's features are made for."""
-        return FeatureConfig.of(self.config, self.action)
+        return FeatureConfig.of(self.config, self.action, winch=self.winch)
 
     @property
     def width(self) -> int:
@@ -129,6 +130,7 @@ class LearningOptions(RunOptions, Where):
         """What the rows have on top of the task."""
         return InterfaceConfig(
             action=self.action,
+            winch=self.winch,
             reward_scale=self.reward_scale,
             reward_knee=self.reward_knee,
             drift_limit=self.drift_limit,

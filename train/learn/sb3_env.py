@@ -76,7 +76,9 @@ class TrainingVecEnv(VecEnv):
         self._commands = np.zeros(rows)
         self._no_infos: list[dict[str, Any]] = [{} for _ in range(rows)]
         self._features = LearnerFeatures(
-            rows, FeatureConfig.of(simulation.config, interface.action), privileged=interface.privileged
+            rows,
+            FeatureConfig.of(simulation.config, interface.action, winch=interface.winch),
+            privileged=interface.privileged,
         )
         self._cuts = Cuts(rows, simulation.control_period, simulation.episode_duration, interface)
         told = practice.waves.shape[2] if practice else 0

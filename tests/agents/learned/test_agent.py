@@ -24,10 +24,10 @@ from agents.rollout import held_out_scenarios, run
 WAVES = ExpectedWaves(frequency=(0.5, 0.7, 0.9, 1.2), variances=((0.05, 0.1, 0.1, 0.05),), build_up=5.0)
 
 
-def agent(observation="state", hidden=8, action="residual"):
+def agent(observation="state", hidden=8, action="residual", winch=False):
     torch.manual_seed(1)
     sensors = None if observation == "state" else Sensors()
-    features = feature_names(FeatureConfig(sensors=sensors, waves=WAVES, action=action))
+    features = feature_names(FeatureConfig(sensors=sensors, waves=WAVES, action=action, winch=winch))
     actor = Actor(len(features), hidden)
     weights = serialise(actor)
     card = AgentCard(
@@ -52,6 +52,17 @@ def write(folder, policy, weights, **changes):
     card = json.loads(card_text(policy.card))
     del card[cards.DIGEST]
     (folder / CARD).write_text(json.dumps(cards.sealed({**card, **changes})))
+
+
+def test_an_agent_that_was_told_the_winch_says_so_by_its_features(tmp_path):
+    policy, weights = agent("sensors", winch=True)
+    write(tmp_path, policy, weights)
+    back = load(tmp_path)
+    assert back.card.made_for.winch
+    assert not agent("sensors")[0].card.made_for.winch
+    scenarios = held_out_scenarios(ScenarioDistribution(max_rope_speed=(1.5, 2.5)), 2)
+    one, other = (run(each, scenarios, episode_duration=2.0, observation="sensors") for each in (policy, back))
+    assert np.array_equal(one.error, other.error)
 
 
 @pytest.mark.parametrize("action", ACTIONS)

@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
 
-from aframe_env import HarmonicMotion, Scenario, ScenarioDistribution
+from aframe_env import Crane, HarmonicMotion, InvalidValue, Scenario, ScenarioDistribution, Told, Winch
 from aframe_env.config import TaskConfig
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.simulation import Simulation
 from agents.learned.features import AUTHORITY, LIMIT, SENSED_FEATURES, STATE_FEATURES, FeatureConfig, Features
+from agents.learned.interface import InterfaceConfig
 
 PERIOD = 0.1
 
@@ -149,3 +150,29 @@ def test_the_speed_action_is_the_drums_speed(observation):
     column = STATE_FEATURES.index("rope_end_speed")
     pulley = got[:, STATE_FEATURES.index("pulley_velocity_z")]
     np.testing.assert_allclose(got[:, column] / 10.0, pulley - rope_speed, atol=1e-4 if observation == "state" else 0.1)
+
+
+def test_the_winch_that_was_told_is_appended_where_it_is_asked_for():
+    true = Scenario(
+        crane=Crane(winch=Winch(lag=0.1)), told=Told(max_rope_speed=2.0, max_rope_acceleration=1.5, lag=0.2)
+    )
+    simulation = Simulation(2, TaskConfig(scenario=true))
+    simulation.reset_rows(np.arange(2), [(true, 0), (Scenario(), 0)])
+    told = [true.as_told, Scenario()]
+    plain, longer = (Features(2, FeatureConfig.of(simulation.config, winch=winch)) for winch in (False, True))
+    observation = simulation.observe()
+    values = longer.start(observation, told)
+    assert longer.names == (*plain.names, "winch_speed", "winch_acceleration", "winch_lag")
+    assert np.array_equal(values[:, :-3], plain.start(observation, told))
+    assert values[:, -3:] == pytest.approx(np.array([[1.0, 1.5, 1.0], [1.5, 2.0, 0.0]]))
+    # One row begins anew on the other winch, the other goes on.
+    again = longer.start(observation[:1], [Scenario()], np.array([0]))
+    assert again[0, -3:] == pytest.approx([1.5, 2.0, 0.0])
+    assert longer.advance(observation)[:, -3:] == pytest.approx(np.array([[1.5, 2.0, 0.0]] * 2))
+
+
+def test_predictive_control_has_the_winch_already():
+    with pytest.raises(InvalidValue, match="winch = True: the features of predictive control"):
+        FeatureConfig(action="predictive", winch=True)
+    with pytest.raises(InvalidValue, match="winch = True: the features of predictive control"):
+        InterfaceConfig(action="predictive", winch=True)
