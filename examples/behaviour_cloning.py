@@ -30,7 +30,7 @@ def clone(
     data = minari.load_dataset(dataset)
     env = data.recover_environment()
     env.reset(seed=0)
-    config, scenario = env.unwrapped.simulation.config, env.unwrapped.scenario
+    config, scenario = env.unwrapped.simulation.config, env.unwrapped.scenario.as_told
     episodes = [episode for episode in data.iterate_episodes() if episode.truncations[-1]]  # no parted ropes
     seen = np.stack([episode.observations[:-1] for episode in episodes])
     actions = np.stack([episode.actions[:, 0] for episode in episodes]).astype(np.float64)

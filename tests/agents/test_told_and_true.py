@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aframe_env import Crane, Rope, ScenarioDistribution, Sensors, TaskConfig, Told, Winch
+from aframe_env import Crane, HarmonicMotion, Rope, Scenario, ScenarioDistribution, Sensors, TaskConfig, Told, Winch
 from aframe_env.env import AFrameHeaveEnv
 from aframe_env.simulation import Simulation
 from aframe_env.task import SENSED, STATE
@@ -13,9 +13,10 @@ from aframe_env.vector_env import AFrameHeaveVectorEnv
 from agents.control.feedback import Feedback
 from agents.learned.wrappers import AgentInterface, AgentVectorInterface
 from agents.policy import Knowledge
-from agents.registry import BuildContext
+from agents.registry import BuildContext, choose
 from agents.rollout import held_out_scenarios, run
 from train.dataset import begun, record
+from train.evaluate.run import observation_of
 from train.shared.episode import Episode
 
 WRONG = Told(load_mass=8e4, axial_stiffness=1.4e8, lag=0.3, max_rope_speed=2.0, max_rope_acceleration=1.0)
@@ -137,3 +138,37 @@ def test_an_agent_learns_on_what_was_told_and_its_critic_on_what_is():
 def test_what_is_built_for_all_is_built_for_what_was_told():
     context = BuildContext(scenarios=[TRUE], config=TaskConfig(scenario=TRUE))
     assert context.nominal == TRUE.as_told
+
+
+def errors_under(scenario, name):
+    config = TaskConfig(scenario=scenario, episode_duration=4.0)
+    policy = choose(name).policy(BuildContext(scenarios=[scenario], config=config))
+    return run(policy, [scenario], config.replaced(observation=observation_of(policy, config))).error
+
+
+@pytest.mark.parametrize(
+    ("name", "privileged"),
+    [
+        ("inverse dynamics", True),
+        ("winch-limited optimum", True),
+        ("S-Ω1 for each scenario", True),
+        ("S-Ω1", False),
+        ("predictive control", False),
+        ("output zero on sensors", False),
+        ("drive-map:clock", False),
+    ],
+)
+def test_only_privileged_policies_go_by_what_is(name, privileged):
+    """Those are built for, and reckon with, the truth, whatever was told; the others with what was told."""
+    motion = HarmonicMotion.paper()
+    told = Told(axial_stiffness=1.2e8, lag=0.6, max_rope_acceleration=0.8, load_mass=4e4)
+    true = Scenario(motion=motion, load_mass=6e4, ramp=2.0)
+    same = np.array_equal(errors_under(replace(true, told=told), name), errors_under(true, name))
+    assert same == privileged
+
+
+def test_a_law_is_designed_for_the_delay_that_was_told():
+    late = replace(TRUE, sensor_delay=0.4, told=Told(sensor_delay=0.2))
+    context = BuildContext(scenarios=[late], config=TaskConfig(scenario=late, observation="sensors"))
+    assert context.sensors == Sensors(delay=0.2)
+    assert choose("feed-forward + feedback").policy(context).sensors == Sensors(delay=0.2)
