@@ -122,13 +122,13 @@ class Simulation:
 
     def observe(self) -> npt.NDArray[np.float32]:
         """Return a fresh observation of every row: (rows, K)."""
-        if self._bank is None:
-            values = self.state.copy()
-            values[:, task.LOAD_MASS] = self._told_mass
-        else:
+        values = self.state
+        if self._bank is not None:
             values = np.concatenate([self._bank.readings, self._known()], axis=1)
         observation = np.empty(values.shape, dtype=np.float32)
         task.clip(values, self._low, self._high, observation)
+        if self._bank is None:
+            observation[:, task.LOAD_MASS] = self._told_mass
         return observation
 
     def copy_row(self, index: int) -> RowState:
