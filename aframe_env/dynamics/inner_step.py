@@ -17,7 +17,7 @@ from aframe_env.dynamics.motion import (
     pulley_on_path,
 )
 from aframe_env.dynamics.target import move_target
-from aframe_env.dynamics.winch import drum_state, next_error, plan
+from aframe_env.dynamics.winch import drum_state, middle_speed, next_error, plan
 
 Array = npt.NDArray[np.float64]
 
@@ -90,13 +90,14 @@ def rope_ends(row: Array, index: int, active: bool, lanes: int, j: int) -> tuple
     error1 = next_error(error0, 2.0 * index + 1.0, first, decay)
     error2 = select(active, next_error(error1, 2.0 * index + 2.0, first, decay), error0)
     radius, free_length = row[at.DRUM_RADIUS * lanes + j], row[at.FREE_LENGTH * lanes + j]
-    length0 = fma(radius, row[at.DRUM_ANGLE * lanes + j], free_length)
-    rate0 = radius * row[at.DRUM_SPEED * lanes + j]
-    angle1, speed1 = drum_at(row, lanes, j, middle, error1)
+    angle0, speed0 = row[at.DRUM_ANGLE * lanes + j], row[at.DRUM_SPEED * lanes + j]
+    angle1, _ = drum_at(row, lanes, j, middle, error1)
     angle2, speed2 = drum_at(row, lanes, j, end, error2)
+    speed1 = middle_speed(angle0, speed0, angle2, speed2, full)
     row[(at.WINCH + 4) * lanes + j] = error2
     row[at.DRUM_ANGLE * lanes + j] = angle2
     row[at.DRUM_SPEED * lanes + j] = speed2
+    length0 = fma(radius, angle0, free_length)
     length1, length2 = fma(radius, angle1, free_length), fma(radius, angle2, free_length)
     # One division for both; the stiffness at the start is the end's of the inner step before.
     share = row[at.AXIAL_STIFFNESS * lanes + j] / (length1 * length2)
@@ -110,7 +111,7 @@ def rope_ends(row: Array, index: int, active: bool, lanes: int, j: int) -> tuple
     put_three(row, at.PULLEY, lanes, j, pulley2)
     put_three(row, at.PULLEY + 3, lanes, j, pulley_rate2)
     return (
-        RopeEnd(pulley0, pulley_rate0, length0, rate0, intact * stiffness0),
+        RopeEnd(pulley0, pulley_rate0, length0, radius * speed0, intact * stiffness0),
         RopeEnd(pulley1, pulley_rate1, length1, radius * speed1, intact * stiffness1),
         RopeEnd(pulley2, pulley_rate2, length2, radius * speed2, intact * stiffness2),
     )
