@@ -11,7 +11,7 @@ from aframe_env.dynamics.compiling import fma, larger, scalar, select
 from aframe_env.dynamics.heavy_rope import lift_step, stage
 from aframe_env.dynamics.layout import Span
 from aframe_env.dynamics.lift import COST, END_TARGET, GROUND, PEAK, SLACKEST, put_end
-from aframe_env.dynamics.load import Load, RopeEnd, load_acceleration, load_constants, rk4_step
+from aframe_env.dynamics.load import Load, RopeEnd, load_constants, rk4_step, rope_pull
 from aframe_env.dynamics.motion import (
     pulley_acceleration_on_path,
     pulley_on_path,
@@ -226,7 +226,7 @@ def measure_tension(row: Array, span: Span) -> None:
         radius = row[at.DRUM_RADIUS * lanes + j]
         length = fma(radius, row[at.DRUM_ANGLE * lanes + j], row[at.FREE_LENGTH * lanes + j])
         intact = 1.0 - row[at.PARTED * lanes + j]
-        _, force = load_acceleration(
+        pull = rope_pull(
             Load(three(row, at.LOAD_POSITION, lanes, j), three(row, at.LOAD_VELOCITY, lanes, j)),
             RopeEnd(
                 three(row, at.PULLEY, lanes, j),
@@ -236,6 +236,6 @@ def measure_tension(row: Array, span: Span) -> None:
                 intact * row[at.AXIAL_STIFFNESS * lanes + j] / length,
             ),
             load_constants(row, intact, lanes, j),
-        )
-        row[at.TENSION * lanes + j] = force
-        row[at.SLACK * lanes + j] = 1.0 if force <= 0.0 else row[at.SLACK * lanes + j]
+        ).force
+        row[at.TENSION * lanes + j] = larger(pull, 0.0)
+        row[at.SLACK * lanes + j] = 1.0 if pull <= 0.0 else row[at.SLACK * lanes + j]

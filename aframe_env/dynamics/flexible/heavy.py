@@ -56,7 +56,7 @@ from aframe_env.dynamics.lift import (
 from aframe_env.dynamics.load import RopeEnd
 from aframe_env.dynamics.target import move_target
 from aframe_env.dynamics.vector import Vector, add, along, cross, difference, inner, scaled
-from aframe_env.dynamics.winch import next_error
+from aframe_env.dynamics.winch import middle_speed, next_error
 
 Array = npt.NDArray[np.float64]
 
@@ -233,14 +233,14 @@ def turn_drum(row: Array, index: int, h: float, lanes: int, j: int) -> tuple[Rop
     angle0, speed0 = row[at.DRUM_ANGLE * lanes + j], row[at.DRUM_SPEED * lanes + j]
     error1 = next_error(row[(at.WINCH + 4) * lanes + j], 2.0 * index + 1.0, first, decay)
     error2 = next_error(error1, 2.0 * index + 2.0, first, decay)
-    angle1, speed1 = drum_at(row, lanes, j, (index + 0.5) * h, error1)
+    angle1, _ = drum_at(row, lanes, j, (index + 0.5) * h, error1)
     angle2, speed2 = drum_at(row, lanes, j, (index + 1.0) * h, error2)
     row[(at.WINCH + 4) * lanes + j] = error2
     row[at.DRUM_ANGLE * lanes + j] = angle2
     row[at.DRUM_SPEED * lanes + j] = speed2
     return (
         RopeOut(free + radius * angle0, radius * speed0),
-        RopeOut(free + radius * angle1, radius * speed1),
+        RopeOut(free + radius * angle1, radius * middle_speed(angle0, speed0, angle2, speed2, h)),
         RopeOut(free + radius * angle2, radius * speed2),
     )
 
