@@ -3,6 +3,7 @@ from .scenario.crane import Compensator, Crane, Frame, Rope, Winch
 from .scenario.distribution import ScenarioDistribution
 from .scenario.file import read_scenario, read_scenarios, scenario_text
 from .scenario.loads import LOADS, ReadyLoad
+from .scenario.luffing import Luffing
 from .scenario.motion import Harmonic, HarmonicMotion
 from .scenario.recorded_motion import RecordedMotion, RecordedWindow
 from .scenario.scenario import Scenario
@@ -34,6 +35,7 @@ __all__ = [
     "HarmonicMotion",
     "InvalidValue",
     "LoadShape",
+    "Luffing",
     "ReadyLoad",
     "RecordNoiseWarning",
     "RecordedMotion",

@@ -112,6 +112,10 @@ class FlexibleEngine(Engine):
 
     def row_vector(self, scenario: Scenario) -> FloatArray:
         """Slots of a row at the start of a scenario, the frame's first: (frame slots + slots,)."""
+        if scenario.luffing is not None:
+            raise InvalidValue(
+                f'luffing = {shown(scenario.luffing)}: model = "rfem" has no frame that luffs: must be None'
+            )
         row = super().row_vector(scenario)
         frame = np.zeros(self._slots)
         frame[flex.FRAME] = self._line(scenario)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.compiling import fma, scalar
 from aframe_env.dynamics.layout import Span
-from aframe_env.dynamics.lift import GIVEN_RATE, PAY_OUT, SPEED, STROKE, advance_slot, aim, divide
+from aframe_env.dynamics.lift import END_REACH, GIVEN_RATE, PAY_OUT, SPEED, STROKE, advance_slot, aim, divide
 
 Array = npt.NDArray[np.float64]
 
@@ -29,15 +29,14 @@ def give(row: Array, source: int, target: int, end: int, fraction: float, weight
         if half_stroke > 0.0:
             stroke = row[(source + STROKE) * lanes + j]
             line, rope = aim(row, source, end, lanes, j), divide(row, source, end, lanes, j)
-            springs, paid_out = int(rope.springs), row[(end + PAY_OUT) * lanes + j]
+            springs = int(rope.springs)
+            fed = row[(end + PAY_OUT) * lanes + j] - row[(end + END_REACH + 1) * lanes + j]
             place, speed = line.away, line.away_rate + line.pulley_speed
             if springs > 1:
                 place, speed = row[(source + springs - 1) * lanes + j], row[(source + SPEED + springs - 1) * lanes + j]
             # The tension at the drum as it would be with the cylinder held; the loss in the rope opposes its speed.
             stiffness = rope.slide * rope.top_stiffness
-            held = stiffness * fma(
-                rope.top_loss, speed - line.pulley_speed - paid_out, place - rope.drum - rope.top_length
-            )
+            held = stiffness * fma(rope.top_loss, speed - line.pulley_speed - fed, place - rope.drum - rope.top_length)
             held += rope.slide * row[at.HALF_WEIGHT * lanes + j]
             column = row[(at.GAS + 1) * lanes + j]
             gas = row[at.GAS * lanes + j] * (column / (column - stroke)) ** row[(at.GAS + 2) * lanes + j]

@@ -81,7 +81,7 @@ def spring(
     place, speed = below.place, below.speed
     next_place, next_speed = row[(source + i + 1) * lanes + j], row[(source + SPEED + i + 1) * lanes + j]
     upper = select(top, rope.drum, next_place)
-    upper_speed = select(top, line.pulley_speed + rope.paid_out, next_speed)
+    upper_speed = select(top, line.pulley_speed + rope.fed, next_speed)
     stiffness = select(top, rope.top_stiffness, rope.stiffness / half)
     elongation = place - upper - select(top, rope.top_length, half * rope.element)
     loss_time = select(top, rope.top_loss, rope.loss_time)
@@ -91,6 +91,7 @@ def spring(
     if i == 0:
         return Pull(next_place, next_speed, speed, highest, tension, least, 0.0, 0.0, 0.0, 0.0)
     # Where the pulley is, the rope goes down with it and with what is paid out.
+    upper_speed = select(top, line.pulley_speed + rope.paid_out, next_speed)
     upper_speed = fma(select(top, rope.softness * tension, 0.0), rope.paid_out, upper_speed)
     share = select(top, top_share, upper_share)
     strain = rope.softness * fma(share, tension - below.tension, below.tension)

@@ -12,6 +12,7 @@ from aframe_env.dynamics.heavy_rope import lift_step, stage
 from aframe_env.dynamics.layout import Span
 from aframe_env.dynamics.lift import COST, END_TARGET, GROUND, PEAK, SLACKEST, put_end
 from aframe_env.dynamics.load import Load, RopeEnd, load_constants, rk4_step, rope_pull
+from aframe_env.dynamics.luffing import reach_on_path
 from aframe_env.dynamics.motion import (
     pulley_acceleration_on_path,
     pulley_on_path,
@@ -173,6 +174,13 @@ def meet_bed(row: Array, span: Span) -> None:
 
 
 @scalar
+def put_end_on_path(row: Array, slot: int, lanes: int, j: int, end: RopeEnd, since_node: float) -> None:
+    """Write the rope's upper ``end`` to ENDS, and what goes with it ``since_node`` s after the node before."""
+    acceleration = pulley_acceleration_on_path(row, since_node, lanes, j)
+    put_end(row, slot, lanes, j, end, acceleration, reach_on_path(row, since_node, lanes, j))
+
+
+@scalar
 def heavy_inner_step(row: Array, index: int, most: int, wide: bool, span: Span) -> None:
     """Make inner step ``index`` in lanes whose ropes have mass or whose loads are in water, as ``inner_step`` does."""
     lanes = span.stride
@@ -181,10 +189,9 @@ def heavy_inner_step(row: Array, index: int, most: int, wide: bool, span: Span) 
         full, since_node = row[at.INNER_STEP * lanes + j], row[at.ELAPSED * lanes + j]
         place = since_node + full * select(active, index, row[at.SUBSTEPS * lanes + j] - 1.0)
         start, middle, end = rope_ends(row, index, active, lanes, j)
-        put_end(row, at.ENDS, lanes, j, start, pulley_acceleration_on_path(row, place, lanes, j))
-        half = pulley_acceleration_on_path(row, place + 0.5 * full, lanes, j)
-        put_end(row, at.ENDS + at.END_SIZE, lanes, j, middle, half)
-        put_end(row, at.ENDS + 2 * at.END_SIZE, lanes, j, end, pulley_acceleration_on_path(row, place + full, lanes, j))
+        put_end_on_path(row, at.ENDS, lanes, j, start, place)
+        put_end_on_path(row, at.ENDS + at.END_SIZE, lanes, j, middle, place + 0.5 * full)
+        put_end_on_path(row, at.ENDS + 2 * at.END_SIZE, lanes, j, end, place + full)
         row[at.STEP_LENGTH * lanes + j] = select(active, full, 0.0)
         row[at.MOMENT * lanes + j] = place + 0.5 * full - since_node
     move_target(row, span)
@@ -207,7 +214,9 @@ def measure_heavy(row: Array, most: int, span: Span) -> None:
         length = fma(radius, row[at.DRUM_ANGLE * lanes + j], row[at.FREE_LENGTH * lanes + j])
         position, velocity = three(row, at.PULLEY, lanes, j), three(row, at.PULLEY + 3, lanes, j)
         end = RopeEnd(position, velocity, length, radius * row[at.DRUM_SPEED * lanes + j], 0.0)
-        put_end(row, at.ENDS, lanes, j, end, three(row, at.PULLEY + 6, lanes, j))
+        since_node = row[at.ELAPSED * lanes + j] + row[at.CONTROL_PERIOD * lanes + j]
+        reach = reach_on_path(row, since_node, lanes, j)
+        put_end(row, at.ENDS, lanes, j, end, three(row, at.PULLEY + 6, lanes, j), reach)
         row[at.STEP_LENGTH * lanes + j] = 0.0
         row[(at.STAGE + SLACKEST) * lanes + j] = 1.0
         # What the water does has been followed to the middle of the last inner step; it goes on to its end.

@@ -18,6 +18,8 @@ CURRENT_MOST: Final = 8
 """Most depths at which a current is given."""
 PROFILE_MOST: Final = 16
 """Most corners of a target's path in time."""
+LUFFING_MOST: Final = 16
+"""Most points of a luffing frame's way in time."""
 
 
 class Span(NamedTuple):
@@ -92,6 +94,15 @@ LANDING_SPEED: Final = _take(1)
 """Greatest speed with which it has come down, m/s."""
 TARGET_RATE: Final = _take(1)
 """Velocity of the target, m/s."""
+TIP: Final = _take(9)
+"""Pulley S along the deck's axes {D} at the next node: position, velocity, acceleration; at rest unless the frame
+luffs."""
+REACH: Final = _take(3)
+"""\\|SH\\| at the next node, its rate and its acceleration: DRUM_TO_PULLEY, 0 and 0 unless the frame luffs."""
+REACH_PATH: Final = _take(6)
+"""Quintic through \\|SH\\| from node to node: coefficients 0..5."""
+LUFFING_ANGLE: Final = _take(1)
+"""Luffing angle of the frame, rad."""
 
 # Parameters.
 MASS: Final = _take(1)
@@ -105,6 +116,7 @@ FREE_LENGTH: Final = _take(1)
 START_LENGTH: Final = _take(1)
 """l_0: unstretched length between drum and load at the start."""
 DRUM_TO_PULLEY: Final = _take(1)
+"""\\|SH\\| at the start, m."""
 DRUM_RADIUS: Final = _take(1)
 MAX_SPEED: Final = _take(1)
 MAX_ACCELERATION: Final = _take(1)
@@ -112,6 +124,15 @@ LAG: Final = _take(1)
 MIN_ANGLE: Final = _take(1)
 MAX_ANGLE: Final = _take(1)
 PULLEY_ON_DECK: Final = _take(3)
+"""Pulley S along the deck's axes {D} at the start, the frame rigid, m."""
+DRUM_ON_DECK: Final = _take(3)
+"""Drum H along {D}, m."""
+LUFFING_POINTS: Final = _take(1)
+"""Points of the frame's way in time; 0 where it holds its angle."""
+LUFFING: Final = _take(2 * LUFFING_MOST)
+"""Their times, s, then the lengths of the servomotors there, m; LUFFING_MOST slots for each."""
+LUFFING_FRAME: Final = _take(3)
+"""Servomotor's height on the leg, its end's x on the deck, height of the frame, m."""
 RAMP_RATE: Final = _take(1)
 RAMP_OFFSET: Final = _take(1)
 CONTROL_PERIOD: Final = _take(1)
@@ -222,10 +243,10 @@ LIFT_B: Final = _take(LIFT_SIZE)
 """The same at the stage after."""
 LIFT_SUM: Final = _take(LIFT_SIZE)
 """Weighted sum of the stages' rates."""
-END_SIZE: Final = 12
+END_SIZE: Final = 14
 ENDS: Final = _take(3 * END_SIZE)
 """Upper end of the rope at the start, middle and end of the inner step: the pulley's position, velocity and
-acceleration, unstretched length between drum and load, its rate, and the target's level."""
+acceleration, unstretched length between drum and load, its rate, the target's level, and \\|SH\\| with its rate."""
 FLOW: Final = _take(3)
 """Velocity of the water about the load at the start of a segment, m/s."""
 FLOW_RATE: Final = _take(3)

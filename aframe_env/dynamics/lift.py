@@ -29,6 +29,7 @@ END_ACCELERATION: Final = 6
 LENGTH: Final = 9
 PAY_OUT: Final = 10
 END_TARGET: Final = 11
+END_REACH: Final = 12
 
 # Places in STAGE: what is summed up over an inner step, and what the full model asks of a stage.
 (
@@ -86,8 +87,10 @@ class Rope(NamedTuple):
     top_loss: float
     drum: float
     """Place of the drum along the line, the pulley being at 0: above it, m."""
+    fed: float
+    """Speed of the rope at the drum, towards the pulley and as seen from there, m/s."""
     paid_out: float
-    """Rate of the rope's unstretched length, m/s."""
+    """Rate of the rope's unstretched length below the pulley, m/s."""
     passing: float
     """The same for an element."""
     inverse_mass: float
@@ -128,14 +131,18 @@ LOAD_SHARE: Final = 1.0 / 6.0
 
 
 @scalar
-def put_end(row: Array, slot: int, lanes: int, j: int, end: RopeEnd, acceleration: Vector) -> None:
-    """Write the rope's upper end to ENDS."""
+def put_end(
+    row: Array, slot: int, lanes: int, j: int, end: RopeEnd, acceleration: Vector, reach: tuple[float, float]
+) -> None:
+    """Write the rope's upper end to ENDS; ``reach``: \\|SH\\| [m] and its rate [m/s]."""
     put_three(row, slot, lanes, j, end.position)
     put_three(row, slot + END_VELOCITY, lanes, j, end.velocity)
     put_three(row, slot + END_ACCELERATION, lanes, j, acceleration)
     row[(slot + LENGTH) * lanes + j] = end.length
     row[(slot + PAY_OUT) * lanes + j] = end.pay_out_speed
     row[(slot + END_TARGET) * lanes + j] = row[at.TARGET * lanes + j]
+    row[(slot + END_REACH) * lanes + j] = reach[0]
+    row[(slot + END_REACH + 1) * lanes + j] = reach[1]
 
 
 @scalar
@@ -194,9 +201,13 @@ def divide(row: Array, source: int, end: int, lanes: int, j: int) -> Rope:
     """Find what all springs of the rope have in common."""
     # What a compensator gives is paid out as the drum's rope is.
     length = row[(end + LENGTH) * lanes + j] + row[(source + STROKE) * lanes + j]
-    pay_out = row[(end + PAY_OUT) * lanes + j] + row[(at.STAGE + GIVEN_RATE) * lanes + j]
+    turned, given = row[(end + PAY_OUT) * lanes + j], row[(at.STAGE + GIVEN_RATE) * lanes + j]
     springs, axial = row[at.SPRINGS * lanes + j], row[at.AXIAL_STIFFNESS * lanes + j]
-    drum_part, loss_time = row[at.DRUM_PART * lanes + j], row[at.LOSS_TIME * lanes + j]
+    # Where a frame luffs, the rope between drum and pulley takes up what it needs at its strain at the start.
+    reach, reach_rate = row[(end + END_REACH) * lanes + j], row[(end + END_REACH + 1) * lanes + j]
+    whole, part = row[at.DRUM_TO_PULLEY * lanes + j], row[at.DRUM_PART * lanes + j]
+    drum_part, taken_up = part * (reach / whole), part * (reach_rate / whole)
+    pay_out, loss_time = turned + given - taken_up, row[at.LOSS_TIME * lanes + j]
     lumps = springs - 1.0
     bare = lumps <= 0.0
     share = 1.0 / select(bare, 1.0, lumps)
@@ -205,7 +216,7 @@ def divide(row: Array, source: int, end: int, lanes: int, j: int) -> Rope:
     top_length = select(bare, length, fma(0.5, element, drum_part))
     intact = 1.0 - row[at.PARTED * lanes + j]
     mass = select(bare, 1.0, row[at.ROPE_MASS * lanes + j] * element)
-    slide = row[at.SHEAVE_FRICTION * lanes + j] * slide_of(row[(end + PAY_OUT) * lanes + j])
+    slide = row[at.SHEAVE_FRICTION * lanes + j] * slide_of(turned - taken_up)
     # A single spring has the constant damping of eq. (26), the elements of a chain their material's.
     constant = row[at.ROPE_DAMPING * lanes + j] * top_length / axial
     return Rope(
@@ -217,7 +228,8 @@ def divide(row: Array, source: int, end: int, lanes: int, j: int) -> Rope:
         top_length,
         intact * axial / fma(slide, drum_part, top_length),
         select(bare, constant, loss_time),
-        -row[at.DRUM_TO_PULLEY * lanes + j],
+        -reach,
+        turned + given - reach_rate,
         pay_out,
         pay_out * share,
         1.0 / mass,

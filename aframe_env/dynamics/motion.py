@@ -128,7 +128,7 @@ def read_record(row: Block, records: npt.NDArray[np.float64], span: Span) -> Non
 def place_pulley(row: Block, span: Span) -> None:
     """Apply the ramp to the deck's motion, and carry the pulley with the deck, eq. (38), at the next node.
 
-    The motion builds up from nothing, the yaw from YAW_START.
+    The motion builds up from nothing, the yaw from YAW_START. The pulley's own motion on the deck is turned with it.
     """
     lanes = span.stride
     for j in range(span.begin, span.end):
@@ -145,21 +145,21 @@ def place_pulley(row: Block, span: Span) -> None:
         row[(at.NODE + 11) * lanes + j] -= dr * start
         row[(at.NODE + 17) * lanes + j] -= ddr * start
     for j in range(span.begin, span.end):
-        x = row[at.PULLEY_ON_DECK * lanes + j]
-        y = row[(at.PULLEY_ON_DECK + 1) * lanes + j]
-        z = row[(at.PULLEY_ON_DECK + 2) * lanes + j]
+        x, dx, ddx = row[at.TIP * lanes + j], row[(at.TIP + 3) * lanes + j], row[(at.TIP + 6) * lanes + j]
+        y, dy, ddy = row[(at.TIP + 1) * lanes + j], row[(at.TIP + 4) * lanes + j], row[(at.TIP + 7) * lanes + j]
+        z, dz, ddz = row[(at.TIP + 2) * lanes + j], row[(at.TIP + 5) * lanes + j], row[(at.TIP + 8) * lanes + j]
         angle, rate, acceleration = (
             row[(at.NODE + 3) * lanes + j],
             row[(at.NODE + 9) * lanes + j],
             row[(at.NODE + 15) * lanes + j],
         )
-        y, z, dy, dz, ddy, ddz = rotate_pair(y, z, 0.0, 0.0, 0.0, 0.0, angle, rate, acceleration)
+        y, z, dy, dz, ddy, ddz = rotate_pair(y, z, dy, dz, ddy, ddz, angle, rate, acceleration)
         angle, rate, acceleration = (
             row[(at.NODE + 4) * lanes + j],
             row[(at.NODE + 10) * lanes + j],
             row[(at.NODE + 16) * lanes + j],
         )
-        z, x, dz, dx, ddz, ddx = rotate_pair(z, x, dz, 0.0, ddz, 0.0, angle, rate, acceleration)
+        z, x, dz, dx, ddz, ddx = rotate_pair(z, x, dz, dx, ddz, ddx, angle, rate, acceleration)
         angle, rate, acceleration = (
             row[(at.NODE + 5) * lanes + j],
             row[(at.NODE + 11) * lanes + j],

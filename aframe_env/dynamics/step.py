@@ -23,6 +23,7 @@ from aframe_env.dynamics.inner_step import (
     plan_winch,
 )
 from aframe_env.dynamics.layout import LANES, Span
+from aframe_env.dynamics.luffing import swing_frame, tell_angle
 from aframe_env.dynamics.motion import (
     advance_motion,
     deck_coordinate,
@@ -35,6 +36,13 @@ Array = npt.NDArray[np.float64]
 
 
 @scalar
+def advance_any(row: Array, components: int, records: Array, span: Span) -> None:
+    """Begin a motion segment of lanes whose frames may luff."""
+    swing_frame(row, span)
+    advance_motion(row, components, records, span)
+
+
+@scalar
 def plan_any(row: Array, span: Span) -> None:
     """Plan the winches of lanes with ropes of either kind, by what power and torque allow."""
     limit_drum(row, span)
@@ -43,7 +51,8 @@ def plan_any(row: Array, span: Span) -> None:
 
 @scalar
 def measure_any(row: Array, span: Span) -> None:
-    """Measure tension and slackness of lanes with ropes of either kind."""
+    """Measure tension and slackness of lanes with ropes of either kind, and the angle of frames that luff."""
+    tell_angle(row, span)
     for j in range(span.begin, span.end):
         own = Span(span.stride, j, j + 1)
         springs = int(row[at.SPRINGS * span.stride + j])
@@ -96,12 +105,16 @@ def block_steps(row: Array, count: int, span: Span) -> None:
 
 
 def _step_of(
+    advance: Callable[[Array, int, Array, Span], None],
     plan_winches: Callable[[Array, Span], None],
     inner_steps: Callable[[Array, int, Span], None],
     measure: Callable[[Array, Span], None],
     measure_start: Callable[[Array, Span], None],
 ) -> tuple[Callable[..., None], Callable[..., None]]:
-    """Control step and start of a block, by how winches are planned, inner steps made, and tensions measured."""
+    """Control step and start of a block.
+
+    By how the motion is advanced, winches are planned, inner steps made, and tensions measured.
+    """
 
     @scalar
     def control_step(row: Array, components: int, segments: int, records: Array, span: Span) -> None:
@@ -114,7 +127,7 @@ def _step_of(
             row[at.CONTACT * lanes + j] = 0.0
             most = row[at.SUBSTEPS * lanes + j] if row[at.SUBSTEPS * lanes + j] > most else most
         for _ in range(segments):
-            advance_motion(row, components, records, span)
+            advance(row, components, records, span)
             plan_winches(row, span)
             begin_load(row, span)
             inner_steps(row, int(most), span)
@@ -139,9 +152,9 @@ def _step_of(
 # Control step of a block by ``segments`` motion segments, the command held; and pose of deck and pulley with the rope's
 # tension at the rows' time, before the first step. With the paper's rope alone; and with ropes of either kind, which
 # takes long to compile and gives the paper's rope the same bits: lane by lane, and in whole blocks.
-control_step, start_rows = _step_of(plan_winch, light_steps, measure_tension, measure_tension)
-lane_control_step, any_start_rows = _step_of(plan_any, lane_steps, measure_any, start_any)
-block_control_step, _ = _step_of(plan_any, block_steps, measure_any, start_any)
+control_step, start_rows = _step_of(advance_motion, plan_winch, light_steps, measure_tension, measure_tension)
+lane_control_step, any_start_rows = _step_of(advance_any, plan_any, lane_steps, measure_any, start_any)
+block_control_step, _ = _step_of(advance_any, plan_any, block_steps, measure_any, start_any)
 
 
 class StepKernels(NamedTuple):

@@ -17,6 +17,7 @@ from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.blocks import put_three, three
 from aframe_env.dynamics.compiling import fma, larger, scalar, smaller
 from aframe_env.dynamics.layout import Span
+from aframe_env.dynamics.luffing import gone_out
 from aframe_env.dynamics.motion import smooth_ramp
 from aframe_env.dynamics.vector import Vector, along, difference, inner, scaled
 
@@ -45,22 +46,27 @@ def current(row: Array, level: float, lanes: int, j: int) -> tuple[float, float]
 def waves_at(row: Array, level: float, back: float, lanes: int, j: int) -> tuple[Vector, Vector, float, float]:
     """Velocity and acceleration of lane j's water at a level, elevation of its surface and its rate.
 
-    ``back``: time from now to the next node of the motion, at which the components have their phases, s.
+    ``back``: time from now to the next node of the motion, at which the components have their phases, s. A frame that
+    luffs takes the place of the load with it, through waves of other phases.
     """
     gravity = row[at.GRAVITY * lanes + j]
     depth = larger(row[at.SURFACE_LEVEL * lanes + j] - level, 0.0)
     time = row[at.NODE_STEP * lanes + j] * row[at.CONTROL_PERIOD * lanes + j] - back
     ramp, ramp_rate, _ = smooth_ramp(time, row[at.RAMP_RATE * lanes + j], row[at.RAMP_OFFSET * lanes + j])
     u, v, w, du, dv, dw, elevation, rate = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    out = gone_out(row, time, lanes, j)
     # The elevation counts near the surface only, so that deep down the loop is over short waves soon.
     shallow = depth < row[at.HALF_HEIGHT * lanes + j] + NEAR
     for k in range(int(row[at.WAVES * lanes + j])):
         base = at.ROW_SLOTS + k * at.COMPONENT_SLOTS
         frequency = row[(base + at.FREQUENCY) * lanes + j]
-        decay = frequency * frequency / gravity * depth
+        number = frequency * frequency / gravity
+        decay = number * depth
         if decay < STILL or shallow:
             re, im = row[(base + at.PHASE_RE) * lanes + j], row[(base + at.PHASE_IM) * lanes + j]
-            c, s = math.cos(frequency * back), math.sin(frequency * back)
+            x, y = row[(base + at.TOWARDS_X) * lanes + j], row[(base + at.TOWARDS_Y) * lanes + j]
+            later = fma(number * x, out, frequency * back)
+            c, s = math.cos(later), math.sin(later)
             re, im = fma(re, c, im * s), fma(im, c, -re * s)
             a, b = row[(base + at.ELEVATION_RE) * lanes + j], row[(base + at.ELEVATION_IM) * lanes + j]
             crest, slope = fma(a, re, -b * im), fma(a, im, b * re)
@@ -69,7 +75,6 @@ def waves_at(row: Array, level: float, back: float, lanes: int, j: int) -> tuple
             moved = frequency * math.exp(-decay)
             along_it, up = moved * crest, -moved * slope
             faster, higher = -moved * frequency * slope, -moved * frequency * crest
-            x, y = row[(base + at.TOWARDS_X) * lanes + j], row[(base + at.TOWARDS_Y) * lanes + j]
             u, v, w = fma(along_it, x, u), fma(along_it, y, v), w + up
             du, dv, dw = fma(faster, x, du), fma(faster, y, dv), dw + higher
     velocity = Vector(ramp * u, ramp * v, ramp * w)

@@ -4,6 +4,7 @@ from aframe_env.scenario.crane import GRAVITY, Compensator, Crane, Frame, Rope, 
 from aframe_env.scenario.distribution import NUMBERS, ScenarioDistribution, ScenarioSource
 from aframe_env.scenario.interval import Range
 from aframe_env.scenario.loads import LOADS, ReadyLoad
+from aframe_env.scenario.luffing import Luffing
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion, ShipMotion
 from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
 from aframe_env.scenario.scenario import Initial, Scenario
@@ -26,6 +27,7 @@ __all__ = [
     "HarmonicMotion",
     "Initial",
     "LoadShape",
+    "Luffing",
     "Range",
     "ReadyLoad",
     "RecordedMotion",

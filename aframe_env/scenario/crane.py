@@ -54,11 +54,16 @@ class Frame:
             )
 
     @property
+    def servomotor_length(self) -> float:
+        """Distance of the servomotors' ends N and C, m."""
+        height = self.servomotor_height * math.cos(self.luffing_angle)
+        return math.hypot(self.servomotor_height * math.sin(self.luffing_angle) - self.servomotor_deck_x, height)
+
+    @property
     def servomotor_arm(self) -> float:
         """Lever arm of the servomotors about the feet, m."""
         height = self.servomotor_height * math.cos(self.luffing_angle)
-        along = self.servomotor_height * math.sin(self.luffing_angle) - self.servomotor_deck_x
-        return abs(self.servomotor_deck_x) * height / math.hypot(along, height)
+        return abs(self.servomotor_deck_x) * height / self.servomotor_length
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.start import write_heavy, write_lift
+from aframe_env.scenario.crane import Frame
+from aframe_env.scenario.luffing import Luffing
 from aframe_env.scenario.scenario import Scenario
 from aframe_env.scenario.sea import SeaMotion
 from aframe_env.scenario.water import Water
@@ -33,6 +35,10 @@ def fill_parameters(row: FloatArray, scenario: Scenario, segment: float, substep
     row[at.MAX_ACCELERATION] = winch.max_acceleration
     row[at.LAG] = winch.lag
     row[at.PULLEY_ON_DECK : at.PULLEY_ON_DECK + 3] = crane.pulley_position
+    row[at.DRUM_ON_DECK : at.DRUM_ON_DECK + 3] = crane.drum_position
+    row[at.TIP : at.TIP + 3] = crane.pulley_position
+    row[at.REACH] = row[at.REACH_PATH] = crane.drum_to_pulley
+    row[at.LUFFING_ANGLE] = crane.frame.luffing_angle
     row[at.RAMP_RATE] = 1.0 / scenario.ramp if scenario.ramp else 0.0
     row[at.RAMP_OFFSET] = 0.0 if scenario.ramp else 1.0
     row[at.CONTROL_PERIOD] = segment
@@ -80,6 +86,8 @@ def _fill_beyond_the_paper(row: FloatArray, scenario: Scenario) -> None:
         for part in range(2):
             first = at.PROFILE + part * at.PROFILE_MOST
             row[first : first + len(turns)] = turns[:, part]
+    if scenario.luffing is not None:
+        _fill_luffing(row, scenario.luffing, crane.frame)
     row[at.RATED_ACCELERATION] = winch.max_acceleration
     row[at.MAX_POWER], row[at.MAX_TORQUE], row[at.DRUM_INERTIA] = winch.max_power, winch.max_torque, winch.inertia
     row[at.LAYER : at.LAYER + 4] = *crane.layer, winch.drum_radius, winch.max_rope_length
@@ -93,6 +101,16 @@ def _fill_beyond_the_paper(row: FloatArray, scenario: Scenario) -> None:
     row[at.BED] = NO_BED
     if scenario.water is not None:
         _fill_water(row, scenario, scenario.water)
+
+
+def _fill_luffing(row: FloatArray, luffing: Luffing, frame: Frame) -> None:
+    """Write the way of a frame that luffs."""
+    strokes = luffing.strokes(frame)
+    row[at.LUFFING_POINTS] = len(strokes)
+    for part in range(2):
+        first = at.LUFFING + part * at.LUFFING_MOST
+        row[first : first + len(strokes)] = [stroke[part] for stroke in strokes]
+    row[at.LUFFING_FRAME : at.LUFFING_FRAME + 3] = frame.servomotor_height, frame.servomotor_deck_x, frame.height
 
 
 def _fill_water(row: FloatArray, scenario: Scenario, water: Water) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -9,6 +10,7 @@ from typing import Any, Final, Literal
 
 from aframe_env.dynamics.start import heavy_lengths, longest_chain_step, springs_of_rope
 from aframe_env.scenario.crane import GRAVITY, Crane
+from aframe_env.scenario.luffing import Luffing
 from aframe_env.scenario.motion import HarmonicMotion, ShipMotion, has_components, is_tabled
 from aframe_env.scenario.target import TargetPath
 from aframe_env.scenario.told import Told
@@ -65,6 +67,8 @@ class Scenario:
     """Time from a motion to its reading, s, in the place of the sensors' own; None: theirs."""
     told: Told | None = None
     """What the operator was told where that is not what is; None: he was told all of it truly."""
+    luffing: Luffing | None = None
+    """Way of the frame from its ``luffing_angle`` on; None: it holds."""
 
     def __post_init__(self) -> None:
         require_instance("crane", self.crane, Crane)
@@ -81,6 +85,9 @@ class Scenario:
             require_instance("water", self.water, Water)
         if self.target_path is not None:
             require_instance("target_path", self.target_path, TargetPath)
+        if self.luffing is not None:
+            require_instance("luffing", self.luffing, Luffing)
+            self.luffing.require_frame(self.crane)
         self._require_room()
         self._require_wet()
         least, most = self.crane.winch.min_rope_length, self.crane.winch.max_rope_length
@@ -160,7 +167,10 @@ class Scenario:
         """Raise where the target is not between pulley and seabed."""
         name = "target_level" if self.target_path is None else "target_level with its path"
         low, high = self.target_levels
-        pulley, ground = self.crane.pulley_position[2], self.bed_level + 0.5 * self.load.height
+        pulley, ground = (
+            min(crane.pulley_position[2] for crane in self._cranes),
+            self.bed_level + 0.5 * self.load.height,
+        )
         if high >= pulley:
             raise InvalidValue(f"{name} = {high!r} m: must be below the pulley, in (-inf, {pulley:g}) m")
         if low < ground:
@@ -171,25 +181,33 @@ class Scenario:
 
     def _require_way(self) -> None:
         """Raise where rope or winch do not reach the ends of the target's path."""
-        if self.target_path is None:
+        if self.target_path is None and self.luffing is None:
             return
+        name = "luffing" if self.target_path is None else "target_path"
         winch, breaking_load = self.crane.winch, self.crane.rope.breaking_load
-        for level in self.target_levels:
-            length = self.crane.pulley_position[2] - level
-            parts = heavy_lengths(
-                length, self.crane.drum_to_pulley, self.weight, self.crane.rope.axial_stiffness, self.rope_weight
-            )
+        for level, crane in itertools.product(self.target_levels, self._cranes):
+            parts = self._lengths(crane, level)
             if not winch.min_rope_length < sum(parts) < winch.max_rope_length:
                 raise InvalidValue(
-                    f"target_path takes the load to {level:g} m, with {sum(parts):g} m of unstretched rope: must be in "
+                    f"{name} takes the load to {level:g} m, with {sum(parts):g} m of unstretched rope: must be in "
                     f"({winch.min_rope_length:g}, {winch.max_rope_length:g}) m, the winch's limits"
                 )
             if self.weight + self.rope_weight * parts[0] >= breaking_load:
                 raise InvalidValue(
-                    f"target_path takes the load to {level:g} m, where rope and load weigh "
+                    f"{name} takes the load to {level:g} m, where rope and load weigh "
                     f"{self.weight + self.rope_weight * parts[0]:g} N: must be below {breaking_load:g} N, at which the "
                     "rope parts"
                 )
+
+    @property
+    def _cranes(self) -> list[Crane]:
+        """The crane at the start, and where it luffs at the angles that pulley and rope reach furthest at."""
+        return [self.crane] if self.luffing is None else self.luffing.cranes(self.crane)
+
+    def _lengths(self, crane: Crane, level: float) -> tuple[float, float]:
+        """Unstretched rope below a crane's pulley and from there to the drum, m, that holds the load at ``level``."""
+        length, axial = crane.pulley_position[2] - level, self.crane.rope.axial_stiffness
+        return heavy_lengths(length, crane.drum_to_pulley, self.weight, axial, self.rope_weight)
 
     def _require_wet(self) -> None:
         """Raise where water, rope and load do not go together."""
@@ -271,12 +289,13 @@ class Scenario:
 
     @property
     def is_light(self) -> bool:
-        """Whether nothing goes beyond the paper: rope without mass, in air, plain winch, a target that holds."""
+        """Whether nothing goes beyond the paper: rope without mass, in air, plain winch, target and frame that hold."""
         return (
             self.water is None
             and not self.crane.rope.mass_per_length
             and self.crane.is_plain
             and self.target_path is None
+            and self.luffing is None
         )
 
     def require_light(self, what: str) -> None:
@@ -284,15 +303,15 @@ class Scenario:
         if not self.is_light:
             raise InvalidValue(
                 f"mass_per_length = {self.crane.rope.mass_per_length!r} kg/m, water = {shown(self.water)}, target_path "
-                f"= {shown(self.target_path)}: {what} take a rope without mass in air, a winch without further limits, "
-                "and a target that holds: must be 0 kg/m, None and None"
+                f"= {shown(self.target_path)}, luffing = {shown(self.luffing)}: {what} take a rope without mass in "
+                "air, a winch without further limits, a target and a frame that hold: must be 0 kg/m, None, None and "
+                "None"
             )
 
     @cached_property
     def lengths(self) -> tuple[float, float]:
         """Unstretched rope below the pulley and from there to the drum, m, that hold the load at its target at rest."""
-        axial = self.crane.rope.axial_stiffness
-        return heavy_lengths(self.rope_length, self.crane.drum_to_pulley, self.weight, axial, self.rope_weight)
+        return self._lengths(self.crane, self.target_level)
 
     @cached_property
     def springs(self) -> int:
@@ -309,13 +328,17 @@ class Scenario:
 
     @property
     def chain_step(self) -> float:
-        """Longest stable inner step for the rope, s, with a tenth of its length wound up; inf without lumps."""
+        """Longest stable inner step for the rope, s, with a tenth of its length wound up; inf without lumps.
+
+        What a frame that luffs leaves of it at the least counts.
+        """
         rope, lumps = self.crane.rope, self.springs - 1
         if lumps < 1:
             return math.inf
         mass = self.load_mass + self.load.added_mass_vertical
+        shortest = min(self._lengths(crane, self.target_level)[0] for crane in self._cranes)
         return longest_chain_step(
-            0.9 * self.lengths[0] / lumps, rope.mass_per_length, rope.axial_stiffness, mass, self.loss_time
+            0.9 * shortest / lumps, rope.mass_per_length, rope.axial_stiffness, mass, self.loss_time
         )
 
     @property

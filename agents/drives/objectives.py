@@ -155,7 +155,8 @@ def _heavy_kernel() -> Callable[..., tuple[float, float, float]]:
                 k = 2 * i + part
                 point = path[k]
                 end = _rope_end(point, angle[k], speed[k], drum)  # type: ignore[no-untyped-call]
-                put_end(row, at.ENDS + part * at.END_SIZE, 1, 0, end, Vector(point[6], point[7], point[8]))
+                felt, reach = Vector(point[6], point[7], point[8]), (point[9], point[10])
+                put_end(row, at.ENDS + part * at.END_SIZE, 1, 0, end, felt, reach)
                 if part == 0:
                     put_three(row, at.PULLEY, 1, 0, end.position)
                     put_three(row, at.PULLEY + 3, 1, 0, end.velocity)
@@ -263,13 +264,14 @@ class Objective:
         engine = Engine(1, 0.5 * self.step, max_inner_step=0.2)
         engine.reset_row(0, scenario)
         row, still = engine.blocks[0], np.zeros(1)
-        self.path = np.empty((len(self.times), 9))
-        """(2 steps + 1, 9): pulley's position, velocity and acceleration at ``times``, base frame."""
-        self.path[0] = row[at.PULLEY : at.PULLEY + 9]
+        self.path = np.empty((len(self.times), 11))
+        """(2 steps + 1, 11), at ``times``: the pulley's position, velocity and acceleration in the base frame, its
+        distance from the drum and the rate of that."""
+        self.path[0] = *row[at.PULLEY : at.PULLEY + 9], *row[at.REACH : at.REACH + 2]
         at_start = engine.copy_row(0)
         for i in range(1, len(self.times)):
             engine.step(still)
-            self.path[i] = row[at.PULLEY : at.PULLEY + 9]
+            self.path[i] = *row[at.PULLEY : at.PULLEY + 9], *row[at.REACH : at.REACH + 2]
         self._row = at_start
         """The engine's row of the scenario at the start, with what a step knows of load and rope."""
         for slot in (at.INVERSE_MASS, at.STIFFNESS):

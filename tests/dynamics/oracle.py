@@ -19,6 +19,8 @@ from aframe_env.scenario.motion import Components
 FloatArray = npt.NDArray[np.float64]
 Drum = Callable[[float], tuple[float, float]]
 """Drum angle [rad] and speed [rad/s] over time."""
+Reach = Callable[[float], tuple[float, float]]
+"""|SH| [m] and its rate [m/s] over time."""
 
 
 class SixDofMotion:
@@ -86,7 +88,12 @@ def free_length(scenario: Scenario) -> float:
 
 
 def forces(
-    t: float, y: FloatArray, scenario: Scenario, pulley_at: Callable[[float], FloatArray], drum: Drum
+    t: float,
+    y: FloatArray,
+    scenario: Scenario,
+    pulley_at: Callable[[float], FloatArray],
+    drum: Drum,
+    reach: Reach | None = None,
 ) -> tuple[float, float, float, float]:
     """Rope tension and its three components on the load, N."""
     crane = scenario.crane
@@ -97,8 +104,9 @@ def forces(
     length = free_length(scenario) + radius * angle
     u1, u2, u3 = s1 - x1, s2 - x2, s3 - x3
     distance = math.sqrt(u1**2 + u2**2 + u3**2)
-    stretch = distance + behind_pulley(scenario) - length
-    rate = (u1 * (d1 - v1) + u2 * (d2 - v2) + u3 * (d3 - v3)) / distance - radius * speed
+    behind, lengthening = (behind_pulley(scenario), 0.0) if reach is None else reach(t)
+    stretch = distance + behind - length
+    rate = (u1 * (d1 - v1) + u2 * (d2 - v2) + u3 * (d3 - v3)) / distance + lengthening - radius * speed
     tension = max(0.0, crane.rope.axial_stiffness / length * stretch + scenario.rope_damping * rate)
     return tension, tension * u1 / distance, tension * u2 / distance, tension * u3 / distance
 
@@ -111,8 +119,12 @@ def solve(
     start: FloatArray | None = None,
     breaks: Iterable[float] = (),
     max_step: float = 0.1,
+    reach: Reach | None = None,
 ) -> FloatArray:
-    """States (T, 7) at ``times``: load position, velocity, ∫(x_L3 - h)² dt. ``breaks``: times of kinks."""
+    """States (T, 7) at ``times``: load position, velocity, ∫(x_L3 - h)² dt. ``breaks``: times of kinks.
+
+    ``reach``: |SH| over time, where it changes.
+    """
     if start is None:
         tip = pulley_at(times[0])
         velocity = tip[3:] if scenario.initial == "comoving" else np.zeros(3)
@@ -122,7 +134,7 @@ def solve(
     y = np.append(start, 0.0)
 
     def slope(t: float, y: FloatArray) -> list[float]:
-        _, f1, f2, f3 = forces(t, y, scenario, pulley_at, drum)
+        _, f1, f2, f3 = forces(t, y, scenario, pulley_at, drum, reach)
         error = y[2] - scenario.target_level
         mass = scenario.load_mass
         return [y[3], y[4], y[5], f1 / mass, f2 / mass, f3 / mass - scenario.gravity, error * error]

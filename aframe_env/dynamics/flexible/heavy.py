@@ -90,7 +90,7 @@ def put_head(row: Array, frame: Array, shift: Vector, rate: Vector, drum: RopeOu
     acceleration = add(apply(turned, felt), Vector(0.0, 0.0, -row[at.GRAVITY * lanes + j]))
     over = row[at.DRUM_TO_PULLEY * lanes + j] - inboard
     end = RopeEnd(place, velocity, drum.length + over, drum.speed + inner(to_drum, rate), 0.0)
-    put_end(row, END, lanes, j, end, acceleration)
+    put_end(row, END, lanes, j, end, acceleration, (row[at.DRUM_TO_PULLEY * lanes + j], 0.0))
 
 
 @scalar
@@ -119,7 +119,7 @@ def put_middle(row: Array, drum: tuple[RopeOut, RopeOut, RopeOut], h: float, lan
     )
     middle = RopeEnd(Vector(x, y, z), Vector(u, v, w), drum[1].length + over, drum[1].speed + over_rate, 0.0)
     both = add(three(row, START + END_ACCELERATION, lanes, j), three(row, END + END_ACCELERATION, lanes, j))
-    put_end(row, MIDDLE, lanes, j, middle, scaled(0.5, both))
+    put_end(row, MIDDLE, lanes, j, middle, scaled(0.5, both), (row[at.DRUM_TO_PULLEY * lanes + j], 0.0))
 
 
 @scalar
