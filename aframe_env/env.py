@@ -103,7 +103,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     rope was slack within the last step), `omega1` [m² s] and `omega2` [m] so far, eqs. (31), (32). `rope_tension` is
     that on the drum's side of the pulley, `load_tension` [N] that at the load. `target_level` [m] is h at the time. On
     a seabed, `landings` and `lift_offs` are counted so far, `landing_speed` [m/s] is the greatest of all landings, and
-    `contact_force` [N] the greatest within the last step.
+    `contact_force` [N] the greatest within the last step. `pulley_position` (3,) [m] is that of S with the frame rigid,
+    `luffing_angle` [rad] the frame's at the time.
 
     With `model="rfem"` also, vectors along the deck's axes: `pulley_deflection` (3,) [m] of S on the frame;
     `foot_reactions` (2, 3) [N], forces on the frame at A_R and A_L; `servomotor_tensions` (2,) [N] of S_R and S_L;

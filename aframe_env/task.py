@@ -87,7 +87,8 @@ SENSED: Final = (
 # Columns of the results: what a step reports beside the observation, in double precision.
 TIME, LOAD, TENSION, SLACK, OMEGA1, OMEGA2, COST, PARTED = 0, 1, 4, 5, 6, 7, 8, 9
 LOAD_TENSION, TARGET, CONTACT, LANDINGS, LIFT_OFFS, LANDING_SPEED = 10, 11, 12, 13, 14, 15
-RESULTS: Final = 16
+PULLEY, LUFFING_ANGLE = 16, 19
+RESULTS: Final = 20
 
 
 def box(quantities: tuple[Quantity, ...]) -> spaces.Box:
@@ -189,6 +190,9 @@ def read_out(row: Any, lanes: int, j: int, state: Any, results: Any, i: int) -> 
     results[i, LANDINGS] = row[at.LANDINGS * lanes + j]
     results[i, LIFT_OFFS] = row[at.LIFT_OFFS * lanes + j]
     results[i, LANDING_SPEED] = row[at.LANDING_SPEED * lanes + j]
+    for k in range(3):
+        results[i, PULLEY + k] = row[(at.PULLEY + k) * lanes + j]
+    results[i, LUFFING_ANGLE] = row[at.LUFFING_ANGLE * lanes + j]
 
 
 @cache
@@ -238,6 +242,8 @@ def info(results: FloatArray, frames: FloatArray | None) -> dict[str, npt.NDArra
         "landings": results[:, LANDINGS].astype(np.int64),
         "lift_offs": results[:, LIFT_OFFS].astype(np.int64),
         "landing_speed": results[:, LANDING_SPEED],
+        "pulley_position": results[:, PULLEY : PULLEY + 3],
+        "luffing_angle": results[:, LUFFING_ANGLE],
     }
     if frames is not None:
         found |= {

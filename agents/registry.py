@@ -99,9 +99,10 @@ class PolicySpec:
     """Digest of the file that it comes from, the card's or the module's; empty for what needs none."""
 
     def policy(self, context: BuildContext) -> Policy:
-        """Build the policy; where the target moves it follows it, unless it is made for that very lift."""
+        """Build the policy; where target or frame move it follows them, unless it is made for that very lift."""
         policy = self.build(context)
-        if isinstance(policy, DrivePolicy | CommandSequence) or not any(s.target_path for s in context.scenarios):
+        moves = any(s.target_path or s.luffing for s in context.scenarios)
+        if isinstance(policy, DrivePolicy | CommandSequence) or not moves:
             return policy
         sensors = {Knowledge.SENSORS: context.sensors, Knowledge.NOTHING: context.config.sensors}.get(policy.knows)
         return Following(policy, sensors)

@@ -259,6 +259,8 @@ def test_information_is_arrays() -> None:
         "landings": ((), "int64"),
         "lift_offs": ((), "int64"),
         "landing_speed": ((), "float64"),
+        "pulley_position": ((3,), "float64"),
+        "luffing_angle": ((), "float64"),
     }
     before = info["time"].item()
     env.step(np.zeros(1, dtype=np.float32))

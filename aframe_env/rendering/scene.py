@@ -36,6 +36,10 @@ class Scene:
     """Rotation of the deck frame into the base frame (3, 3)."""
     pulley: FloatArray
     """Place of the pulley S (3,)."""
+    luffing_angle: float
+    """Of the frame, now."""
+    furthest: tuple[float, float]
+    """Greatest x and z of the pulley on the deck in the whole episode."""
     pulley_heave: float
     """Height of S above its place with the ship at rest."""
     load: FloatArray
@@ -79,6 +83,7 @@ def scene_of(simulation: Simulation, row: int) -> Scene:
         raise gymnasium.error.ResetNeeded("render() before the first reset()")
     engine, state, results = simulation.engine, simulation.state[row], simulation.results[row]
     coordinates = engine.deck()[row]
+    pulleys = [crane.pulley_position for crane in scenario.cranes]
     return Scene(
         time=float(results[task.TIME]),
         motion=motion_in_words(scenario.motion),
@@ -87,6 +92,8 @@ def scene_of(simulation: Simulation, row: int) -> Scene:
         deck=coordinates[:3],
         rotation=rotation(*coordinates[3:].tolist()),
         pulley=engine.read_many(at.PULLEY, 3)[row],
+        luffing_angle=float(results[task.LUFFING_ANGLE]),
+        furthest=(max(x for x, _, _ in pulleys), max(z for _, _, z in pulleys)),
         pulley_heave=float(state[task.PULLEY_HEAVE]),
         load=results[task.LOAD : task.LOAD + 3].copy(),
         load_mass=scenario.load_mass,

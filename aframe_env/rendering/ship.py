@@ -63,7 +63,7 @@ def _draw_house(canvas: Canvas, view: View, scene: Scene) -> None:
 def draw_frame_and_drum(canvas: Canvas, view: View, scene: Scene) -> None:
     """Draw the portal: legs from the feet A to the corners B, the top beam with S, the servomotors N-C; the drum."""
     frame = scene.crane.frame
-    sine, cosine = math.sin(frame.luffing_angle), math.cos(frame.luffing_angle)
+    sine, cosine = math.sin(scene.luffing_angle), math.cos(scene.luffing_angle)
 
     def pixel(x: float, y: float, z: float) -> FloatArray:
         return view.pixels(scene.on_deck([x, y, z]))

@@ -65,7 +65,7 @@ def draw_side_view(canvas: Canvas, box: Box, scene: Scene, still: Scene | None =
 
 def scale_of(scene: Scene) -> float:
     """Scale of the side view, pixels per metre: the pulley and the words beside it are within the picture."""
-    x, _, z = scene.crane.pulley_position
+    x, z = scene.furthest
     return min(_SCALE, (_AFT - _WORDS[0]) / max(x, 1.0), (_ABOVE - _WORDS[1]) / (max(z, 1.0) + _HEAVE))
 
 

@@ -23,6 +23,7 @@ Files that are named within are looked for beside the scenario file.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -45,6 +46,7 @@ from aframe_env.scenario.cross_sections import (
 from aframe_env.scenario.distribution import ScenarioDistribution, ScenarioSource
 from aframe_env.scenario.interval import Range
 from aframe_env.scenario.loads import ready_load
+from aframe_env.scenario.luffing import Luffing
 from aframe_env.scenario.motion import HarmonicMotion, ShipMotion
 from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
 from aframe_env.scenario.scenario import Scenario
@@ -189,12 +191,19 @@ def _converter(folder: Path) -> Converter:
     def peak_enhancement(value: Any, _: Any) -> Range | str:
         return value if isinstance(value, str) else interval(value, None)
 
+    def luffing(value: Any, _: Any) -> Luffing:
+        return converter.structure(value, _Luffing).way()
+
     shape = converter.get_structure_hook(LoadShape)
 
     def load(value: Any, kind: Any) -> LoadShape:
         return ready_load(value).shape if isinstance(value, str) else shape(value, kind)
 
     converter.register_structure_hook(LoadShape, load)
+    converter.register_structure_hook(Luffing, luffing)
+    way = converter.get_unstructure_hook(Luffing)
+    # Radians, since not every angle has a number of degrees that reads back as the same.
+    converter.register_unstructure_hook(Luffing, lambda each: {"degrees": False, **way(each)})
     converter.register_structure_hook(StressPoint, stress_point)
     converter.register_structure_hook_func(lambda kind: kind == MemberSection, member)
     converter.register_structure_hook_func(lambda kind: kind == Section, section)
@@ -241,6 +250,22 @@ class _SeaMotion:
     sea: Sea
     vessel: str = _SUPPLY
     deck_position: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Luffing:
+    """``[luffing]``: ``Luffing`` with its angles in degrees."""
+
+    points: tuple[tuple[float, float], ...]
+    degrees: bool = True
+    """False: the angles are in rad."""
+    max_speed: float = Luffing.max_speed
+    max_acceleration: float = Luffing.max_acceleration
+
+    def way(self) -> Luffing:
+        """The way that the table says."""
+        points = tuple((time, math.radians(angle) if self.degrees else angle) for time, angle in self.points)
+        return Luffing(points=points, max_speed=self.max_speed, max_acceleration=self.max_acceleration)
 
 
 def _recorded(table: _Recorded, folder: Path) -> RecordedMotion | RecordedWindow:

@@ -168,7 +168,7 @@ class Scenario:
         name = "target_level" if self.target_path is None else "target_level with its path"
         low, high = self.target_levels
         pulley, ground = (
-            min(crane.pulley_position[2] for crane in self._cranes),
+            min(crane.pulley_position[2] for crane in self.cranes),
             self.bed_level + 0.5 * self.load.height,
         )
         if high >= pulley:
@@ -185,7 +185,7 @@ class Scenario:
             return
         name = "luffing" if self.target_path is None else "target_path"
         winch, breaking_load = self.crane.winch, self.crane.rope.breaking_load
-        for level, crane in itertools.product(self.target_levels, self._cranes):
+        for level, crane in itertools.product(self.target_levels, self.cranes):
             parts = self._lengths(crane, level)
             if not winch.min_rope_length < sum(parts) < winch.max_rope_length:
                 raise InvalidValue(
@@ -200,7 +200,7 @@ class Scenario:
                 )
 
     @property
-    def _cranes(self) -> list[Crane]:
+    def cranes(self) -> list[Crane]:
         """The crane at the start, and where it luffs at the angles that pulley and rope reach furthest at."""
         return [self.crane] if self.luffing is None else self.luffing.cranes(self.crane)
 
@@ -336,7 +336,7 @@ class Scenario:
         if lumps < 1:
             return math.inf
         mass = self.load_mass + self.load.added_mass_vertical
-        shortest = min(self._lengths(crane, self.target_level)[0] for crane in self._cranes)
+        shortest = min(self._lengths(crane, self.target_level)[0] for crane in self.cranes)
         return longest_chain_step(
             0.9 * shortest / lumps, rope.mass_per_length, rope.axial_stiffness, mass, self.loss_time
         )

@@ -42,7 +42,7 @@ class RequiredRope:
         self._weight = np.array([s.weight for s in scenarios])
         self._gravity = np.array([s.gravity for s in scenarios])
         self._axial_stiffness = np.array([s.crane.rope.axial_stiffness for s in scenarios])
-        self._to_pulley = np.array([s.crane.drum_to_pulley for s in scenarios])
+        self._reach = self._engine.read(at.REACH)
         self._free_length = np.array([s.free_length for s in scenarios])
         self._rope_length = np.array([s.rope_length for s in scenarios])
         self._stretch = np.array([s.rope_length - s.lengths[0] for s in scenarios])
@@ -56,9 +56,10 @@ class RequiredRope:
         height = pulley[:, 2] - self._level
         length = np.sqrt(((pulley[:, :2] - self._place) ** 2).sum(axis=1) + height**2)
         stretched = 1.0 + self._weight * length / height / self._axial_stiffness
-        light = (length + self._to_pulley) / stretched - self._free_length
+        reach = self._engine.read(at.REACH)
+        light = (length + reach) / stretched - self._free_length
         # Aslant the rope bears more, and is stretched by as much more.
-        further = length - self._rope_length - self._stretch * (length / height - 1.0)
+        further = length - self._rope_length + reach - self._reach - self._stretch * (length / height - 1.0)
         return np.asarray(np.where(self._heavy, further / (1.0 + self._strain), light))
 
     def advance(self) -> None:

@@ -1,21 +1,21 @@
-"""Lowering and hoisting: a wrapper by which policies that hold a load at its level follow a target that moves.
+"""Lowering, hoisting and luffing: a wrapper by which policies that hold a load follow a target or a frame that moves.
 
-The way of the target is known on board, and so is the rope that holds the load there. The drum pays that rope out, and
-the policy sees, and commands, what deviates from it: to the policy the load hangs at a level that holds, on a rope that
-slowly becomes another one.
+The way of the target is known on board, that of the pulley on the deck too, and so is the rope that holds the load
+there. The drum pays that rope out, and the policy sees, and commands, what deviates from it: to the policy the load
+hangs at a level that holds, under a pulley that the sea alone moves, on a rope that slowly becomes another one.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from aframe_env.dynamics.start import heavy_lengths
-from aframe_env.scenario import Scenario
+from aframe_env.scenario import Crane, Scenario
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue
@@ -46,6 +46,12 @@ class Planned(NamedTuple):
     """At the pulley, N."""
     rate: float
     """Velocity of the load, m/s."""
+    heave: float
+    """Height of the pulley above its place at the start, the ship at rest, m."""
+    heave_rate: float
+    """m/s."""
+    heave_acceleration: float
+    """m/s²."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +59,7 @@ class PayOut:
     """Plan of one row: the load under water all the way, at rest or lowered so evenly that only drag holds it up."""
 
     scenario: Scenario
-    """Only what a ``Lift`` has is looked at, and the way of the target."""
+    """Only what a ``Lift`` has is looked at, and the ways of target and frame."""
     weight: float
     """Of the load in its water, N."""
 
@@ -62,21 +68,33 @@ class PayOut:
         """Plan for the load that hangs still at ``target_level`` while the pulley bears a ``tension`` [N]."""
         rope_weight, weight = scenario.rope_weight, tension
         for _ in range(4):  # each time the strain, some 1e-3, takes what is wrong
-            weight = max(tension - rope_weight * cls(scenario, weight)._lengths(0.0, 0.0)[0], LEAST_WEIGHT)
+            weight = max(
+                tension - rope_weight * cls(scenario, weight)._lengths(scenario.target_level, 0.0, scenario.crane)[0],
+                LEAST_WEIGHT,
+            )
         return cls(scenario, weight)
 
     def at(self, time: float) -> Planned:
         """Plan ``time`` s after the start."""
         path = self.scenario.target_path
         change, rate = (0.0, 0.0) if path is None else path.at(time)
-        below, drum_part = self._lengths(change, rate)
+        crane, heave = self.scenario.crane, (0.0, 0.0, 0.0)
+        if self.scenario.luffing is not None:
+            swing = self.scenario.luffing.at(crane.frame, time)
+            start = crane.pulley_position[2]
+            crane = replace(crane, frame=replace(crane.frame, luffing_angle=float(swing.angle[0])))
+            heave = (
+                float(swing.pulley[0, 2]) - start,
+                float(swing.pulley_velocity[0, 2]),
+                float(swing.pulley_acceleration[0, 2]),
+            )
+        below, drum_part = self._lengths(self.scenario.target_level + change, rate, crane)
         weight, rope_weight = self._pull(rate)
-        return Planned(below + drum_part, weight + rope_weight * below, rate)
+        return Planned(below + drum_part, weight + rope_weight * below, rate, *heave)
 
-    def _lengths(self, change: float, rate: float) -> tuple[float, float]:
-        scenario, crane = self.scenario, self.scenario.crane
+    def _lengths(self, level: float, rate: float, crane: Crane) -> tuple[float, float]:
         weight, rope_weight = self._pull(rate)
-        length = crane.pulley_position[2] - scenario.target_level - change
+        length = crane.pulley_position[2] - level
         return heavy_lengths(length, crane.drum_to_pulley, weight, crane.rope.axial_stiffness, rope_weight)
 
     def _pull(self, rate: float) -> tuple[float, float]:
@@ -90,7 +108,10 @@ class PayOut:
 
 @dataclass
 class Following:
-    """Let ``policy`` follow the ``target_path`` of its scenarios."""
+    """Let ``policy`` follow the ``target_path`` and the ``luffing`` of its scenarios.
+
+    A policy that knows the future knows where the pulley will be, and is left to meet that by itself.
+    """
 
     policy: Policy
     sensors: Sensors | None = None
@@ -124,9 +145,11 @@ class Following:
             )
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
-        """Begin N episodes; of the scenarios only what a ``Lift`` has and the target's way is looked at."""
-        self._scenarios, self._period, self._plans = scenarios, control_period, []
-        self.policy.reset(scenarios, control_period)
+        """Begin N episodes; of the scenarios only what a ``Lift`` has and the ways of target and frame count."""
+        at_rest = [replace(scenario, luffing=None) if scenario.luffing else scenario for scenario in scenarios]
+        knows_pulley = self.policy.knows is Knowledge.FUTURE
+        self._scenarios, self._period, self._plans = at_rest if knows_pulley else scenarios, control_period, []
+        self.policy.reset(scenarios if knows_pulley else at_rest, control_period)
 
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for observations (N, K)."""
@@ -135,7 +158,10 @@ class Following:
         if not self._plans:
             self._start(o, columns)
         then = time - (0.0 if self.sensors is None else self.sensors.delay)
-        length, tension, rate = self._planned(then)
+        length, tension, rate, *heaves = self._planned(then)
+        for name, heave in zip(("pulley_heave", "pulley_velocity_z", "pulley_acceleration_z"), heaves, strict=True):
+            if name in columns:
+                o[:, columns[name]] -= heave
         now, later = self._planned(time)[0], self._planned(time + self._period)[0]
         angle = o[:, columns["drum_angle"]].copy()
         self._paid_out += self._drum_radius() * (angle - self._angle)
@@ -165,7 +191,7 @@ class Following:
     def _start(self, o: FloatArray, columns: dict[str, int]) -> None:
         tension = o[:, columns["rope_tension"]].tolist()
         self._plans = [PayOut.weighed(s, each) for s, each in zip(self._scenarios, tension, strict=True)]
-        length, tensions, _ = self._planned(0.0)
+        length, tensions, *_ = self._planned(0.0)
         self._first, self._tuned = (length, tensions), length
         self._paid_out, self._angle = np.zeros(len(o)), o[:, columns["drum_angle"]].copy()
         cranes = [scenario.crane for scenario in self._scenarios]
@@ -179,7 +205,6 @@ class Following:
         length = self._first[0] + self._paid_out
         return np.array([s.crane.drum_radius(x) for s, x in zip(self._scenarios, length.tolist(), strict=True)])
 
-    def _planned(self, time: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Length [m], tension [N] and velocity of the load [m/s] by the plans, each (N,)."""
-        length, tension, rate = np.array([plan.at(max(time, 0.0)) for plan in self._plans]).T
-        return length, tension, rate
+    def _planned(self, time: float) -> FloatArray:
+        """What a ``Planned`` holds by the plans of all rows: (6, N)."""
+        return np.array([plan.at(max(time, 0.0)) for plan in self._plans]).T

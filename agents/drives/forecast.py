@@ -15,7 +15,7 @@ from scipy.optimize import least_squares
 
 from aframe_env.scenario import Scenario
 from aframe_env.scenario.motion import Components, Coordinate, has_components
-from aframe_env.validation import InvalidValue, require_integer, require_number
+from aframe_env.validation import InvalidValue, require_integer, require_number, shown
 from agents.control.expected_waves import pulley_heave
 from agents.policy import FloatArray
 
@@ -45,6 +45,10 @@ class Harmonics:
 
 
 def _components(scenario: Scenario) -> Components:
+    if scenario.luffing is not None:
+        raise InvalidValue(
+            f"luffing = {shown(scenario.luffing)}: the forecast is for a pulley that rests on the deck: must be None"
+        )
     if not has_components(scenario.motion):
         raise InvalidValue(f"motion = {scenario.motion}: a recorded motion is not known before the start")
     return scenario.motion.components()

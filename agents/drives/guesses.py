@@ -44,8 +44,11 @@ def required_angle(objective: Objective) -> FloatArray:
     scenario = objective.scenario
     crane = scenario.crane
     load = np.array([*crane.pulley_position[:2], scenario.target_level])
+    if scenario.luffing is not None:
+        load = scenario.luffing.at(crane.frame, objective.times).pulley
+        load[:, 2] = scenario.target_level
     distance = np.linalg.norm(objective.path[:, :3] - load, axis=1)
-    length = (distance + crane.drum_to_pulley) / (1.0 + scenario.pulley_strain)
+    length = (distance + objective.path[:, 9]) / (1.0 + scenario.pulley_strain)
     return np.asarray((length - length[0]) / crane.winch.drum_radius)
 
 

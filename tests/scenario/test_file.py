@@ -1,9 +1,20 @@
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aframe_env import Harmonic, HarmonicMotion, InvalidValue, RecordedMotion, Scenario, ScenarioDistribution, Vessel
+from aframe_env import (
+    Harmonic,
+    HarmonicMotion,
+    InvalidValue,
+    Luffing,
+    RecordedMotion,
+    Scenario,
+    ScenarioDistribution,
+    Vessel,
+)
 from aframe_env.scenario.crane import Crane, Frame
 from aframe_env.scenario.cross_sections import FrameStructure, ISection, Servomotor, Tube
 from aframe_env.scenario.file import read_scenario, scenario_text
@@ -137,3 +148,14 @@ def test_a_bad_file_is_named_with_its_key(text, words, tmp_path):
 def test_an_unreadable_file(tmp_path):
     with pytest.raises(InvalidValue, match="cannot be read"):
         read_scenario(tmp_path / "absent.toml")
+
+
+def test_a_frame_that_luffs_is_read_in_degrees_and_written_so_that_it_reads_back_the_same(tmp_path):
+    (tmp_path / "swing.toml").write_text(
+        "target_level = -20.0\n[crane.frame]\nluffing_angle = -0.6981317\n[crane.winch]\nmin_rope_length = 10.0\n"
+        "[luffing]\npoints = [[0, -40.0], [60, 25.0], [130, -37.3]]\nmax_speed = 0.2\n"
+    )
+    scenario = read_scenario(tmp_path / "swing.toml")
+    angles = (math.radians(-40.0), math.radians(25.0), math.radians(-37.3))
+    assert scenario.luffing == Luffing(points=tuple(zip((0.0, 60.0, 130.0), angles, strict=True)), max_speed=0.2)
+    assert back(scenario, tmp_path) == scenario

@@ -34,7 +34,7 @@ from aframe_env import (
     read_scenarios,
 )
 from aframe_env.scenario.cross_sections import FrameStructure, Material, Servomotor
-from aframe_env.scenario.file import _SECTIONS, _Distribution, _Recorded, _SeaMotion
+from aframe_env.scenario.file import _SECTIONS, _Distribution, _Luffing, _Recorded, _SeaMotion
 
 PAGE = (Path(__file__).parents[2] / "docs" / "scenario-files.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```(\w+)\n(.*?)```", PAGE, flags=re.DOTALL)
@@ -56,12 +56,13 @@ TABLES = {
     Servomotor: "`[crane.frame.structure.servomotor]`:",
     TargetPath: "## `[target_path]`",
     Told: "## `[told]`",
+    _Luffing: "## `[luffing]`",
     Water: "## `[water]`",
     Seabed: "`[water.seabed]`:",
     Compensator: "`[crane.compensator]`:",
     LoadShape: "`[load]`:",
 }
-ELSEWHERE = {"crane", "motion", "water", "load", "target_path", "told"}
+ELSEWHERE = {"crane", "motion", "water", "load", "target_path", "told", "luffing"}
 """Keys of a scenario that have sections of their own."""
 
 

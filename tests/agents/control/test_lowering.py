@@ -7,7 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aframe_env import Crane, HarmonicMotion, LoadShape, Rope, Scenario, Sea, SeaMotion, Sensors, Vessel, Water, Winch
+from aframe_env import (
+    Crane,
+    Frame,
+    HarmonicMotion,
+    LoadShape,
+    Luffing,
+    Rope,
+    Scenario,
+    Sea,
+    SeaMotion,
+    Sensors,
+    Vessel,
+    Water,
+    Winch,
+)
 from aframe_env.scenario.target import TargetPath
 from aframe_env.validation import InvalidValue
 from agents.control.feedback import Feedback
@@ -60,6 +74,22 @@ def test_in_a_sea_following_is_nearly_as_good_as_holding(scenario: Scenario, sen
     followed = run(Following(Feedback(sensors), sensors), [moving], observation=see).rms[0]
     assert followed < held + 0.02
     assert followed < 0.1 * still
+
+
+@pytest.mark.parametrize("sensors", [None, Sensors()], ids=["state", "sensors"])
+def test_while_the_frame_swings_the_load_is_held_as_under_one_that_holds(sensors: Sensors | None) -> None:
+    inboard, outboard = np.radians([-40.0, 25.0]).tolist()
+    crane = Crane(frame=Frame(luffing_angle=inboard), winch=Winch(min_rope_length=10.0))
+    holding = in_a_sea(replace(LIGHT, crane=crane, target_level=-50.0, target_path=None))
+    swinging = replace(holding, luffing=Luffing.swing(inboard, outboard, 10.0, 60.0))
+    see = "state" if sensors is None else "sensors"
+    held = run(Feedback(sensors), [holding], observation=see, episode_duration=80.0).rms[0]
+    followed = run(Following(Feedback(sensors), sensors), [swinging], observation=see, episode_duration=80.0)
+    blind = run(Feedback(sensors), [swinging], observation=see, episode_duration=80.0)
+    assert followed.rms[0] < 1.5 * held
+    assert followed.rms[0] < 0.2 * blind.rms[0]
+    # Who knows the future knows where the pulley will be.
+    assert run(InverseDynamics(), [swinging], episode_duration=80.0).rms[0] < 0.005
 
 
 def test_a_policy_is_tuned_to_a_rope_that_grows() -> None:
