@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 from aframe_env import Crane, Frame, HarmonicMotion, InvalidValue, LoadShape, Luffing, Rope, Scenario, Water, Winch
 from aframe_env.dynamics import layout as at
 from aframe_env.engine import Engine
+from aframe_env.env import AFrameHeaveEnv
 
 INBOARD, OUTBOARD = math.radians(-40.0), math.radians(25.0)
 CRANE = Crane(frame=Frame(luffing_angle=INBOARD), winch=Winch(min_rope_length=5.0))
@@ -184,3 +185,23 @@ def test_kinematics_are_derivatives_of_each_other_and_lengths_those_of_the_trian
 def test_ways_that_cannot_be_are_refused(points: tuple[tuple[float, float], ...], message: str) -> None:
     with pytest.raises(InvalidValue, match=message):
         Scenario(crane=CRANE, target_level=5.0, luffing=Luffing(points=points))
+
+
+def test_full_model_refuses_a_frame_that_luffs() -> None:
+    scenario = Scenario(crane=CRANE, target_level=-60.0, luffing=QUICK)
+    with pytest.raises(InvalidValue, match='luffing = .*: model = "rfem" has no frame that luffs: must be None'):
+        AFrameHeaveEnv(scenario=scenario, model="rfem", rfes=(1, 2)).reset(seed=0)
+
+
+def test_information_tells_angle_and_pulley_and_the_picture_shows_them() -> None:
+    scenario = Scenario(crane=CRANE, target_level=-20.0, motion=HarmonicMotion(), luffing=QUICK)
+    env = AFrameHeaveEnv(scenario=scenario, episode_duration=65.0, render_mode="rgb_array")
+    _, info = env.reset(seed=0)
+    assert info["luffing_angle"] == pytest.approx(INBOARD, abs=1e-12)
+    before = env.render()
+    for _ in range(450):
+        *_, info = env.step(np.zeros(1, dtype=np.float32))
+    assert info["luffing_angle"] == pytest.approx(OUTBOARD, abs=0.01)
+    place = 12.0 * np.array([math.sin(info["luffing_angle"]), 0.0, math.cos(info["luffing_angle"])])
+    assert info["pulley_position"] == pytest.approx(place, abs=1e-9)
+    assert np.any(before != env.render())
