@@ -11,7 +11,20 @@ import oracle
 import pytest
 from scipy.optimize import brentq
 
-from aframe_env import Crane, Frame, HarmonicMotion, InvalidValue, LoadShape, Luffing, Rope, Scenario, Water, Winch
+from aframe_env import (
+    Crane,
+    Frame,
+    HarmonicMotion,
+    InvalidValue,
+    LoadShape,
+    Luffing,
+    Rope,
+    Scenario,
+    Sea,
+    SeaMotion,
+    Water,
+    Winch,
+)
 from aframe_env.dynamics import layout as at
 from aframe_env.engine import Engine
 from aframe_env.env import AFrameHeaveEnv
@@ -187,9 +200,35 @@ def test_ways_that_cannot_be_are_refused(points: tuple[tuple[float, float], ...]
         Scenario(crane=CRANE, target_level=5.0, luffing=Luffing(points=points))
 
 
+def test_waves_about_the_load_are_those_where_the_pulley_has_got_to() -> None:
+    sea = SeaMotion(sea=Sea(hs=2.0, tp=7.0, heading=2.5, seed=1))
+    swing = Luffing.swing(INBOARD, OUTBOARD, 1.0, 30.0, max_speed=0.3)
+    scenario = Scenario(
+        crane=CRANE,
+        target_level=-20.0,
+        motion=sea,
+        luffing=swing,
+        water=Water(surface_level=-5.0),
+        load=LoadShape(volume=5.0, added_mass_vertical=5e3, drag_area_vertical=10.0),
+    )
+    engine = Engine(1, 0.1)
+    engine.reset_row(0, scenario)
+    for _ in range(200):
+        level = engine.read(at.LOAD_POSITION + 2)[0]
+        engine.step(np.zeros(1))
+    time = 19.9
+    out = 12.0 * math.sin(angle_of(scenario)(time))
+    elevation, _ = sea.waves_under(out, 0.0, 9.81)
+    frequency = sea.sea.waves().frequency
+    turned = elevation * np.exp(1j * frequency * time)
+    assert engine.read(at.SURFACE)[0] == pytest.approx(-5.0 + turned.real.sum(), abs=1e-6)
+    upwards = -(frequency * np.exp(-(frequency**2) / 9.81 * (-5.0 - level)) * turned.imag).sum()
+    assert engine.read(at.FLOW + 2)[0] == pytest.approx(upwards, abs=1e-6)
+
+
 def test_full_model_refuses_a_frame_that_luffs() -> None:
     scenario = Scenario(crane=CRANE, target_level=-60.0, luffing=QUICK)
-    with pytest.raises(InvalidValue, match='luffing = .*: model = "rfem" has no frame that luffs: must be None'):
+    with pytest.raises(InvalidValue, match=r'luffing = .*: model = "rfem" has no frame that luffs: must be None'):
         AFrameHeaveEnv(scenario=scenario, model="rfem", rfes=(1, 2)).reset(seed=0)
 
 

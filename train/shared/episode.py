@@ -87,7 +87,17 @@ class Episode:
 
 def between(before: Scene, after: Scene, share: float) -> Scene:
     """Return the scene at a share in [0, 1] of the way from one to the next: a control step is short."""
-    moving = ("time", "deck", "rotation", "pulley", "pulley_heave", "load", "drum_angle", "rope_length")
+    moving = (
+        "time",
+        "deck",
+        "rotation",
+        "pulley",
+        "luffing_angle",
+        "pulley_heave",
+        "load",
+        "drum_angle",
+        "rope_length",
+    )
     return replace(
         after,
         **{name: (1.0 - share) * getattr(before, name) + share * getattr(after, name) for name in moving},
