@@ -69,9 +69,15 @@ def test_in_a_sea_following_is_nearly_as_good_as_holding(scenario: Scenario, sen
     moving = in_a_sea(scenario)
     holding = replace(moving, target_path=None, target_level=moving.target_level - 10.0)
     see = "state" if sensors is None else "sensors"
-    still = run(DrumStill(), [holding], observation=see).rms[0]
-    held = run(Feedback(sensors), [holding], observation=see).rms[0]
-    followed = run(Following(Feedback(sensors), sensors), [moving], observation=see).rms[0]
+    # A mean over the sensors' noise: what a loop leaves on a heavy rope's own waves scatters by a tenth with it.
+    still, held, followed = (
+        run(policy, [each] * 4, observation=see).rms.mean()
+        for policy, each in (
+            (DrumStill(), holding),
+            (Feedback(sensors), holding),
+            (Following(Feedback(sensors), sensors), moving),
+        )
+    )
     assert followed < held + 0.02
     assert followed < 0.1 * still
 
