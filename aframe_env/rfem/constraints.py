@@ -3,14 +3,14 @@ eqs. (23)–(30).
 
 Constraints are eliminated, not integrated: q = Z z + P b with C Z = 0 and C P = 1, so that the feet and the
 lengths of rigid servomotors cannot drift, whatever the integrator and the duration. Z is local (one small
-block for each group of rfes that constraints touch) and M-orthonormal, ZᵀMZ = 1; P = M⁻¹Cᵀ(CM⁻¹Cᵀ)⁻¹ is
-M-orthogonal to Z, so that the reactions follow from positions and velocities alone: R = Pᵀ(K q + L q̇ − f) +
-(CM⁻¹Cᵀ)⁻¹ b̈.
+block for each group of rfes that constraints touch); P = M⁻¹Cᵀ(CM⁻¹Cᵀ)⁻¹ is M-orthogonal to Z, so that the
+reactions follow from positions and velocities alone: R = Pᵀ(K q + L q̇ − f) + (CM⁻¹Cᵀ)⁻¹ b̈.
 
 The length of a servomotor is the one of the linear frame, |NC| + e·u_N with the unit vector e of C–N undeformed: like
 K_F and the rotations of (10) it leaves out what is of second order in the displacements. The displaced points are some
 |u_N|²/(2 |NC|) further apart, a sideways displacement above all. To hold that distance instead would not make the frame
-more exact: the legs' chords A–N lengthen in the same way, and forces keep their undeformed directions.
+more exact: the legs' chords A–N lengthen in the same way, and forces keep their undeformed directions. What that comes
+to, all of it together, is in :mod:`aframe_env.rfem.second_order`.
 """
 
 from __future__ import annotations
@@ -58,6 +58,12 @@ def servomotor_direction(frame: Frame, side: str, angle: float | None = None) ->
     return np.asarray(link / np.linalg.norm(link))
 
 
+def servomotor_length(frame: Frame) -> float:
+    """|CN|, frame undeformed, m."""
+    along = frame.servomotor_height * np.sin(frame.luffing_angle) - frame.servomotor_deck_x
+    return float(np.hypot(along, frame.servomotor_height * np.cos(frame.luffing_angle)))
+
+
 def servomotor_rows(frame: Frame, structure: Structure) -> Array:
     """(2, n): shortening of S_R and S_L by q; the transpose times a tension is the force on the frame."""
     return np.vstack([-servomotor_direction(frame, side) @ structure.translation(f"N_{side}") for side in ("R", "L")])
@@ -74,8 +80,11 @@ def _joint_rows(structure: Structure) -> list[Array]:
     return rows
 
 
-def constrain(frame: Frame, structure: Structure) -> Constraints:
-    """Constraints of feet (3 each), joints (6 each) and, where they are rigid, servomotors (1 each)."""
+def constrain(frame: Frame, structure: Structure, mass: scipy.sparse.csr_array) -> Constraints:
+    """Constraints of feet (3 each), joints (6 each) and, where they are rigid, servomotors (1 each).
+
+    ``mass``: M_F, (n, n).
+    """
     rows, names = [], []
     if frame.structure.servomotor.stiffness is None:
         rows.append(servomotor_rows(frame, structure))
@@ -87,20 +96,19 @@ def constrain(frame: Frame, structure: Structure) -> Constraints:
         rows.append(block)
         names += [f"J_B{'RL'[number]}{axis}" for axis in range(1, 7)]
     matrix = np.vstack(rows)
-    mass = structure.mass()
-    scaled = matrix / mass
-    weight = np.linalg.inv(scaled @ matrix.T)
+    freed = scipy.sparse.linalg.splu(mass.tocsc()).solve(np.ascontiguousarray(matrix.T))
+    weight = np.linalg.inv(matrix @ freed)
     return Constraints(
         names=tuple(names),
         matrix=matrix,
-        basis=local_basis(matrix, mass),
-        particular=scaled.T @ weight,
+        basis=local_basis(matrix, mass.diagonal()),
+        particular=freed @ weight,
         weight=np.asarray(weight, dtype=np.float64),
     )
 
 
 def local_basis(matrix: Array, mass: Array, coordinates: int = 6) -> Array:
-    """Local M-orthonormal null-space basis: bodies that share a constraint form a group, solved by itself.
+    """Local null-space basis: bodies that share a constraint form a group, solved by itself.
 
     Args:
         matrix: C, (r, n).
@@ -108,7 +116,7 @@ def local_basis(matrix: Array, mass: Array, coordinates: int = 6) -> Array:
         coordinates: Of each body; n is a multiple of it.
 
     Returns:
-        Z, (n, n − r), with C Z = 0 and ZᵀMZ = 1.
+        Z, (n, n − r), with C Z = 0, orthonormal as to that diagonal.
     """
     root = np.sqrt(mass)
     bodies = mass.size // coordinates

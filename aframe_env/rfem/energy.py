@@ -6,10 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
+from scipy.sparse.linalg import splu
 
 from aframe_env.rfem.beam import Array
 from aframe_env.rfem.constraints import servomotor_direction
+from aframe_env.rfem.deck import DeckStates
+from aframe_env.rfem.history import FrameHistory
 from aframe_env.rfem.simulate import DrivenDrum, DynamicResult
+from aframe_env.rfem.slices import SKEW
 from aframe_env.validation import InvalidValue
 
 
@@ -36,8 +40,8 @@ class EnergyBalance:
 def energy_balance(result: DynamicResult) -> EnergyBalance:
     """Compute the balance of a run whose output interval is its step (powers are integrated by the trapezoidal rule).
 
-    The deck's work is that of the reactions, so this checks them too. On a deck that turns the frame's
-    displacements turn with it, and the balance holds to first order in them only, like eq. (10).
+    The deck's work is that of the reactions, so this checks them too. They carry the frame as if every force on it
+    acted where it is undeformed, eq. (10); a deck that turns also works against the moments that displacements add.
 
     Raises:
         InvalidValue: The output interval is longer than the step.
@@ -49,22 +53,9 @@ def energy_balance(result: DynamicResult) -> EnergyBalance:
             f"output_interval = {case.output_interval} s: must be the step, {case.step} s, for a balance"
         )
     model, deck = history.model, result.deck
-    to_frame = deck.rotation @ model.to_deck
-    spin = deck.angular_velocity @ model.to_deck
-    carried = np.einsum("kij,ki->kj", to_frame, deck.velocity)
-
-    kinetic = 0.5 * scenario.load_mass * np.sum(result.load_velocity**2, axis=1)
-    potential = scenario.weight * result.load[:, 2]
-    for index, body in enumerate(model.structure.bodies):
-        own = slice(6 * index, 6 * index + 6)
-        shift = history.position[:, own][:, :3] @ body.axes.T
-        rates = history.velocity[:, own]
-        arm = body.centre + shift
-        speed = carried + np.cross(spin, arm) + rates[:, :3] @ body.axes.T
-        turning = spin @ body.axes + rates[:, 3:]
-        kinetic += 0.5 * body.mass * np.sum(speed**2, axis=1) + 0.5 * turning**2 @ body.inertia
-        place = deck.position[:, 2] + np.einsum("kj,kj->k", to_frame[:, 2], arm)
-        potential += body.mass * scenario.gravity * place
+    moving = _MovingFrame(history, deck)
+    kinetic = moving.kinetic() + 0.5 * scenario.load_mass * np.sum(result.load_velocity**2, axis=1)
+    potential = moving.potential(scenario.gravity) + scenario.weight * result.load[:, 2]
     strain = 0.5 * np.einsum("ki,ki->k", history.position @ model.stiffness, history.position)
     length = scenario.free_length + crane.winch.drum_radius * result.drum_angle
     strain += 0.5 * result.elastic_tension**2 * length / crane.rope.axial_stiffness
@@ -101,10 +92,14 @@ def energy_balance(result: DynamicResult) -> EnergyBalance:
         end = np.array([frame.servomotor_deck_x, sign * frame.half_width, 0.0])
         along = model.to_deck @ servomotor_direction(frame, side)
         power -= servomotors[:, column] * (speed_of(end) @ along)
+    pull = np.einsum("kij,ki->kj", turn, to_load) + to_drum
+    pull *= result.tension[:, None]
+    spin = deck.angular_velocity @ model.to_deck
+    power -= np.sum(spin * (moving.moments() + np.cross(history.displacement("S"), pull) @ model.to_deck), axis=1)
     if history.stroke is not None:
         power -= np.sum(servomotors * history.stroke[1], axis=1)
     drum = case.drum
-    pull = result.tension + 0.5 * result.elastic_tension**2 / crane.rope.axial_stiffness
+    drawn = result.tension + 0.5 * result.elastic_tension**2 / crane.rope.axial_stiffness
     if isinstance(drum, DrivenDrum):
         kinetic += 0.5 * drum.inertia * result.drum_rate**2
         moments = [
@@ -113,10 +108,61 @@ def energy_balance(result: DynamicResult) -> EnergyBalance:
         ]
         power += np.array(moments) * result.drum_rate
     else:
-        power -= pull * crane.winch.drum_radius * result.drum_rate
+        power -= drawn * crane.winch.drum_radius * result.drum_rate
     stored = kinetic + potential + strain
     return EnergyBalance(
         stored=stored - stored[0],
         input=cumulative_trapezoid(power, result.time, initial=0),
         dissipated=cumulative_trapezoid(loss, result.time, initial=0),
     )
+
+
+class _MovingFrame:
+    """The frame's slices over a run, along {F}."""
+
+    def __init__(self, history: FrameHistory, deck: DeckStates) -> None:
+        model = history.model
+        self._slices, self._deck, self._field = model.slices, deck, history.field
+        self._to_frame = deck.rotation @ model.to_deck
+        self._spin = _skew(deck.angular_velocity @ model.to_deck)
+        self._turning = _skew(deck.angular_acceleration @ model.to_deck) + self._spin @ self._spin
+        forces = history.force - history.position @ model.stiffness - history.velocity @ model.damping
+        forces = forces + history.reactions() @ model.constraints.matrix
+        accelerated = splu(model.mass.tocsc()).solve(np.ascontiguousarray(forces.T)).T
+        self._moved, self._moving, self._accelerated = (
+            [np.moveaxis(part, 2, 0) for part in self._slices.moved(np.ascontiguousarray(motion.T))]
+            for motion in (history.position, history.velocity, accelerated)
+        )
+
+    def kinetic(self) -> Array:
+        """(k,), J: of slices that move by u + θ× y in a frame that turns."""
+        slices, spin = self._slices, self._spin
+        own = np.einsum("kij,ki->kj", self._to_frame, self._deck.velocity)
+        place = slices.place + self._moved[0]
+        speed = own[:, None] + np.einsum("kij,ksj->ksi", spin, place) + self._moving[0]
+        gradient = spin[:, None] @ (np.eye(3) + _skew(self._moved[1])) + _skew(self._moving[1])
+        turning = np.einsum("ksij,sjl,ksil->k", gradient, slices.second, gradient)
+        return np.asarray(0.5 * (np.einsum("s,ksi,ksi->k", slices.mass, speed, speed) + turning))
+
+    def potential(self, gravity: float) -> Array:
+        """(k,), J."""
+        place = np.einsum("kj,ksj->ks", self._to_frame[:, 2], self._slices.place + self._moved[0])
+        return np.asarray(gravity * (self._slices.mass @ (self._deck.position[:, 2] + place.T)))
+
+    def moments(self) -> Array:
+        """Moments of weight and inertia that the displacements add, about the deck's origin, (k, 3), N m."""
+        slices, turning, coriolis = self._slices, self._turning, 2.0 * self._spin
+        felt = self._field[:, None] - np.einsum("kij,ksj->ksi", turning, slices.place + self._moved[0])
+        felt -= np.einsum("kij,ksj->ksi", coriolis, self._moving[0]) + self._accelerated[0]
+        total = np.einsum("s,ksi->ki", slices.mass, np.cross(self._moved[0], felt))
+        turned = _skew(self._moved[1])
+        gradient = turning[:, None] @ (np.eye(3) + turned) + coriolis[:, None] @ _skew(self._moving[1])
+        gradient += _skew(self._accelerated[1])
+        return np.asarray(
+            total - np.einsum("iab,ksac,scd,ksbd->ki", SKEW, turned, slices.second, gradient, optimize=True)
+        )
+
+
+def _skew(vectors: Array) -> Array:
+    """v× of vectors (…, 3): (…, 3, 3)."""
+    return np.asarray(np.einsum("iaj,...a->...ij", SKEW, vectors))

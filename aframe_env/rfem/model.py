@@ -1,8 +1,9 @@
 """The full model's constant matrices: everything that statics, modes and dynamics need of the frame.
 
-M_F is diagonal and constant, K_F and L_F are constant, eqs. (14)–(22). A frame on a deck that turns or a
-frame that luffs adds inertial terms e_F, which are linear in the deck's acceleration and in q, q̇
-(:class:`CarriedInertia`).
+M_F, K_F and L_F are constant, eqs. (14)–(22). A frame on a deck that turns or a frame that luffs adds inertial terms
+e_F, which are linear in the deck's acceleration and in q, q̇: a point of {F} at ρ has the acceleration w + W ρ, w = RᵀP̈
+and W = RᵀR̈ (R: {F} → inertial, P: origin), and its displacement u adds W u + 2 Ω× u̇. Over the frame's mass that is
+e_F = E_0 w + E_1 W + E(W) q + E(2 Ω×) q̇ (:mod:`aframe_env.rfem.slices`).
 """
 
 from __future__ import annotations
@@ -16,8 +17,10 @@ import numpy as np
 import scipy
 
 from aframe_env.dynamics.flexible.readout import SMALL_ROTATION
+from aframe_env.rfem.banded import BandedCholesky
 from aframe_env.rfem.beam import Array
 from aframe_env.rfem.constraints import Constraints, constrain, luffing_rotation, servomotor_rows
+from aframe_env.rfem.slices import Slices, slices_of
 from aframe_env.rfem.structure import Division, Structure, one_chain, three_beams
 from aframe_env.scenario.crane import GRAVITY, Frame
 from aframe_env.validation import SmallRotationWarning, require_choice
@@ -51,11 +54,19 @@ class FrameModel:
     division: Division
     structure: Structure
     constraints: Constraints
+    geometric: scipy.sparse.csr_array | None = None
+    """Geometric stiffness K_G, (n, n), of the state about which it is linear, see
+    :mod:`aframe_env.rfem.second_order`; None: of the undeformed and unloaded frame."""
 
     @cached_property
-    def mass(self) -> Array:
-        """Diagonal of M_F, (n,)."""
-        return self.structure.mass()
+    def slices(self) -> Slices:
+        """Its mass and how q moves it."""
+        return slices_of(self.structure)
+
+    @cached_property
+    def mass(self) -> scipy.sparse.csr_array:
+        """M_F, (n, n), kg and kg m²; diagonal with the paper's elements, eq. (14)."""
+        return self.slices.mass_matrix()
 
     @cached_property
     def deformation(self) -> scipy.sparse.csr_array:
@@ -63,21 +74,21 @@ class FrameModel:
         return self.structure.deformation()
 
     @cached_property
-    def stiffness(self) -> Array:
-        """K_F with that of elastic servomotors, (n, n), N/m and N m/rad."""
+    def stiffness(self) -> scipy.sparse.csr_array:
+        """K_F with that of elastic servomotors and K_G, (n, n), N/m and N m/rad."""
         servomotor = self.frame.structure.servomotor.stiffness or 0.0
-        return self._assembled(self.structure.stiffness(), servomotor)
+        total = self._assembled(self.structure.stiffness(), servomotor)
+        return total if self.geometric is None else scipy.sparse.csr_array(total + self.geometric)
 
     @cached_property
-    def damping(self) -> Array:
+    def damping(self) -> scipy.sparse.csr_array:
         """L_F with that of elastic servomotors, (n, n), N s/m and N m s/rad."""
         return self._assembled(self.structure.damping(), self.frame.structure.servomotor.damping)
 
-    def _assembled(self, diagonal: Array, servomotor: float) -> Array:
-        spread = self.deformation
-        total = (spread.T @ scipy.sparse.diags_array(diagonal) @ spread).toarray()
-        rows = self.servomotors
-        return np.asarray(total + servomotor * rows.T @ rows, dtype=np.float64)
+    def _assembled(self, diagonal: Array, servomotor: float) -> scipy.sparse.csr_array:
+        spread, rows = self.deformation, scipy.sparse.csr_array(self.servomotors)
+        total = spread.T @ scipy.sparse.diags_array(diagonal) @ spread + servomotor * (rows.T @ rows)
+        return scipy.sparse.csr_array(total)
 
     @cached_property
     def servomotors(self) -> Array:
@@ -86,13 +97,12 @@ class FrameModel:
 
     @cached_property
     def lengthening(self) -> Array:
-        """(n, 2): share P b of q for S_R or S_L longer by 1 m; zero where they are elastic.
-
-        It moves only the rfes that constraints touch, so never that of S.
-        """
+        """(n, 2): q at rest and unloaded for S_R or S_L longer by 1 m; zero where they are elastic."""
         if self.frame.structure.servomotor.stiffness is not None:
             return np.zeros((self.structure.size, 2))
-        return -self.constraints.particular[:, :2]
+        given, basis = -self.constraints.particular[:, :2], self.constraints.basis
+        bent = BandedCholesky(self.reduced_stiffness).solve(basis.T @ (self.stiffness @ given))
+        return np.asarray(given - basis @ bent)
 
     @cached_property
     def pulley(self) -> Array:
@@ -106,15 +116,11 @@ class FrameModel:
 
     @cached_property
     def reduced_stiffness(self) -> Array:
-        """ZᵀKZ, (n_z, n_z), 1/s² (Z is M-orthonormal)."""
-        return self._reduced(self.stiffness)
+        """ZᵀKZ, (n_z, n_z)."""
+        return self.reduced(self.stiffness)
 
-    @cached_property
-    def reduced_damping(self) -> Array:
-        """ZᵀLZ, (n_z, n_z), 1/s."""
-        return self._reduced(self.damping)
-
-    def _reduced(self, matrix: Array) -> Array:
+    def reduced(self, matrix: Array | scipy.sparse.csr_array) -> Array:
+        """ZᵀAZ, (n_z, n_z), of a symmetric matrix A, (n, n)."""
         basis = scipy.sparse.csr_array(self.constraints.basis)
         reduced = (basis.T @ scipy.sparse.csr_array(matrix) @ basis).toarray()
         return np.asarray(0.5 * (reduced + reduced.T), dtype=np.float64)
@@ -138,13 +144,11 @@ class FrameModel:
 
     def uniform_field(self) -> Array:
         """(n, 3): generalised forces per unit of a uniform acceleration field along the axes of {F}."""
-        field = np.zeros((self.structure.size, 3))
-        for index, body in enumerate(self.structure.bodies):
-            field[6 * index : 6 * index + 3] = body.mass * body.axes.T
-        return np.asarray(field - self.deformation.T @ self._fixed_end_forces.reshape(-1, 3), dtype=np.float64)
+        return self.slices.uniform()
 
     @cached_property
-    def _fixed_end_forces(self) -> Array:
+    def fixed_end_forces(self) -> Array:
+        """Section forces at the sdes by a unit uniform field along {F}, the elements' ends held, (n_sde, 6, 3)."""
         return np.array([spring.fixed_end_forces for spring in self.structure.springs])
 
     def reactions(self, residual: Array, lengthening: Array | None = None) -> Array:
@@ -180,7 +184,7 @@ class FrameModel:
         if velocity is not None:
             forces = forces + (self.deformation @ velocity.T).T * self.structure.damping()
         result = np.asarray(forces).reshape(*position.shape[:-1], -1, 6)
-        return result if field is None else result + np.einsum("sij,...j->...si", self._fixed_end_forces, field)
+        return result if field is None else result + np.einsum("sij,...j->...si", self.fixed_end_forces, field)
 
     def warn_of_rotation(self, position: Array) -> float:
         """Largest rotation of an rfe, rad; warn with the figure when it passes 0.05 rad."""
@@ -190,56 +194,12 @@ class FrameModel:
         return largest
 
 
-class CarriedInertia:
-    """Inertial terms e_F of a frame carried by a deck that turns, and by its own luffing.
-
-    A point of {F} at ρ has the acceleration w + W ρ, w = RᵀP̈ and W = RᵀR̈ (R: {F} → inertial, P: origin),
-    and its displacement u adds W u + 2 Ω× u̇. Integrated over the rfes: e_F = E_0 w + E_1 W + E(W) q + E(2
-    Ω×) q̇.
-    """
-
-    def __init__(self, model: FrameModel) -> None:
-        bodies = model.structure.bodies
-        self._uniform = model.uniform_field()
-        self._constant = np.zeros((model.structure.size, 3, 3))
-        self._blocks = np.zeros((len(bodies), 6, 6, 3, 3))
-        permutation = np.zeros((3, 3, 3))
-        for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-            permutation[a, b, c], permutation[a, c, b] = 1.0, -1.0
-        for index, body in enumerate(bodies):
-            axes = body.axes
-            # ∫ s sᵀ dm along the principal axes, from the moments of inertia.
-            second = np.diag(0.5 * np.sum(body.inertia) - body.inertia)
-            local = np.zeros((6, 3, 3))
-            local[:3] = body.mass * np.einsum("ac,d->acd", np.eye(3), axes.T @ body.centre)
-            local[3:] = np.einsum("abc,bd->acd", permutation, second)
-            block = np.zeros((6, 6, 3, 3))
-            block[:3, :3] = body.mass * np.einsum("ac,bd->abcd", np.eye(3), np.eye(3))
-            block[3:, 3:] = np.einsum("abc,def,bf->aecd", permutation, permutation, second)
-            # From W along the principal axes, AᵀWA, to W along {F}.
-            self._constant[6 * index : 6 * index + 6] = np.einsum("acd,ec,fd->aef", local, axes, axes)
-            self._blocks[index] = np.einsum("abcd,ec,fd->abef", block, axes, axes)
-
-    def constant(self, acceleration: Array, turning: Array) -> Array:
-        """e_F of the undeformed frame, (n,): ``acceleration`` w (3,), m/s², ``turning`` W (3, 3), 1/s²."""
-        return np.asarray(self._uniform @ acceleration + np.einsum("aef,ef->a", self._constant, turning))
-
-    def blocks(self, turning: Array) -> Array:
-        """E(W), one 6 × 6 block a body: (rfes, 6, 6)."""
-        return np.tensordot(self._blocks, turning, axes=2)
-
-
-def apply_blocks(blocks: Array, displacement: Array) -> Array:
-    """Block diagonal matrix (rfes, 6, 6) times q or q̇, (n,)."""
-    return np.asarray((blocks @ displacement.reshape(-1, 6, 1)).ravel())
-
-
 def frame_model(
     frame: Frame,
     division: Division | None = None,
     *,
     layout: Layout = "one_chain",
-    corrected_shear: bool = False,
+    corrected_shear: bool = True,
 ) -> FrameModel:
     """Build the full model of ``frame``.
 
@@ -247,10 +207,12 @@ def frame_model(
         frame: Geometry, material, sections, servomotors.
         division: Primary elements of legs and beam; default 10 and 8.
         layout: ``"one_chain"`` (the paper's model) or ``"three_beams"`` (its previous one). Same results.
-        corrected_shear: See :func:`aframe_env.rfem.beam.divide`.
+        corrected_shear: Correct the shear of the sdes, see :func:`aframe_env.rfem.beam.divide`, and take the mass that
+            is consistent with it, see :mod:`aframe_env.rfem.slices`. False: the paper's elements, eqs. (2)–(7), (14).
     """
     require_choice("layout", layout, ("one_chain", "three_beams"))
     cut = division or Division()
     build = one_chain if layout == "one_chain" else three_beams
     structure = build(frame, cut, corrected_shear=corrected_shear)
-    return FrameModel(frame, cut, structure, constrain(frame, structure))
+    mass = slices_of(structure).mass_matrix()
+    return FrameModel(frame, cut, structure, constrain(frame, structure, mass))

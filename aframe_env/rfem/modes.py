@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import eigh
 
 from aframe_env.rfem.beam import Array
 from aframe_env.rfem.model import FrameModel, frame_model
+from aframe_env.rfem.reduction import natural_modes
 from aframe_env.validation import InvalidValue, require_integer
 
 if TYPE_CHECKING:
@@ -44,9 +44,9 @@ def frame_modes(crane: Crane, count: int = 10, *, model: FrameModel | None = Non
     if frame.frame != crane.frame:
         raise InvalidValue("model: must have been made of the crane's own frame")
     require_integer("count", count, low=1, high=frame.unknowns["free coordinates"])
-    squares, vectors = eigh(frame.reduced_stiffness, subset_by_index=[0, count - 1])
+    squares, shape = natural_modes(frame, count)
     return Modes(
         model=frame,
         frequency=np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi),
-        shape=frame.constraints.basis @ vectors,
+        shape=shape,
     )

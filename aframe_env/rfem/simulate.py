@@ -1,9 +1,9 @@
 """Stand-alone runs of the full model: frame, rope, load and drum on a moving deck, eqs. (23)–(30).
 
-The frame's coordinates are those left by the constraints; frame, load and drum all step with average
-acceleration. In a step the rope's force at its end is found by iteration to convergence (no splitting): the
-frame answers a force at S through a constant 3 × 3 matrix, so that an iteration costs no solution of the
-frame.
+The frame steps exactly in its modes under forces that are interpolated over the step; load and drum step by Fox and
+Goodwin's scheme. The rope's force at the step's end is found by iteration to convergence (no splitting): the frame
+answers it at S through constant 3 × 3 matrices, so that an iteration costs no step of the frame. Modes of a period
+below two steps are left out, but for their static shapes.
 """
 
 from __future__ import annotations
@@ -11,14 +11,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 
 from aframe_env.rfem.beam import Array
 from aframe_env.rfem.deck import DeckStates, deck_coordinates, deck_states
+from aframe_env.rfem.exact_step import exact_step
 from aframe_env.rfem.history import FrameHistory
-from aframe_env.rfem.integrator import AverageAcceleration
-from aframe_env.rfem.model import CarriedInertia, FrameModel, apply_blocks, frame_model
+from aframe_env.rfem.model import FrameModel, frame_model
+from aframe_env.rfem.reduction import ModalFrame, of_motion, resolved_form
 from aframe_env.rfem.rope_law import RopeForce, rope_force
 from aframe_env.rfem.servomotor_stroke import Stroke, strokes_at
 from aframe_env.rfem.statics import solve
@@ -55,6 +57,9 @@ class DrivenDrum:
         require_number("inertia", self.inertia, "kg m²", low=0.0, low_open=True)
 
 
+FOX_GOODWIN: Final = 1.0 / 12.0
+"""β of load and drum: x(h) = x + h ẋ + (1/2 - β) h² ẍ + β h² ẍ(h), fourth order in the phase."""
+
 Drum = StillDrum | PrescribedDrum | DrivenDrum
 
 
@@ -72,7 +77,7 @@ class DynamicCase:
     duration: float = 60.0
     """s."""
     step: float = 2.5e-3
-    """s; made a little smaller so that a whole number of them makes an output interval."""
+    """Of frame, load and drum, s; made a little smaller so that a whole number of them makes an output interval."""
     output_interval: float = 0.05
     """s."""
 
@@ -150,28 +155,38 @@ class _Run:
         self.case, self.model, self.inner = case, model, inner
         self.scenario, self.crane = case.scenario, case.scenario.crane
         self.outputs = max(1, round(case.duration / case.output_interval))
-        self.scheme = AverageAcceleration(model, case.output_interval / inner)
-        self.times: Array = self.scheme.step * np.arange(self.outputs * inner + 1, dtype=np.float64)
-        self.carriage = _Carriage(self.scenario, model, self.scheme.step, self.times.size)
-        self.inertia = CarriedInertia(model)
-        self.turned = (-1, np.zeros(0), np.zeros(0), np.zeros(0))
-        self.uniform = model.uniform_field()
+        self.step = case.output_interval / inner
+        self.times: Array = self.step * np.arange(self.outputs * inner + 1, dtype=np.float64)
+        self.carriage = _Carriage(self.scenario, model, self.step, self.times.size)
+        self.modal = resolved_form(model, self.step)
+        self.exact = exact_step(self.modal, self.step)
         self.stroke = strokes_at(case.strokes, self.times)
-        given = model.lengthening
-        driving = np.hstack([self.uniform, -model.stiffness @ given, -model.damping @ given])
-        self.driving = np.ascontiguousarray(model.constraints.basis.T @ driving)
-        self.driven_by = np.hstack([self.carriage.field, self.stroke[0], self.stroke[1]])
-        self.coupling = self.scheme.pulley @ self.scheme.response
+        given, shape = model.lengthening, self.modal.shape
+        driving = np.hstack([model.uniform_field(), -(model.damping @ given), -(model.mass @ given)])
+        driven_by = np.hstack([self.carriage.field, self.stroke[1], self.stroke[2]])
+        self.driven = driven_by @ (shape.T @ driving).T
+        """Forces on the modes that do not depend on their state, (steps, m)."""
+        self.carried = _Carried(self.carriage, self.modal, self.stroke)
+        self.pulley = model.pulley @ shape
+        self.given = model.pulley @ given
+        cubic, linear = (
+            np.array([[self.pulley @ self.exact.times(part, self.pulley.T) for part in row] for row in factors])
+            for factors in (self.exact.cubic, self.exact.linear)
+        )
+        self.answer = np.stack([cubic[:, 2], cubic[:, 3], linear[:, 1]], axis=1)
+        """Place and rate of S by the rope's elastic force, its rate, and its damping force at the end: (2, 3, 3, 3)."""
         self.radius, self.unstretched = self.crane.winch.drum_radius, self.scenario.free_length
+        self.place, self.rates = np.zeros(self.modal.count), np.zeros(self.modal.count)
         self.load, self.load_velocity, self.load_acceleration = (np.zeros(3) for _ in range(3))
         self.angle, self.rate, self.angular_acceleration = 0.0, 0.0, 0.0
-        self.force = np.zeros(3)
-        self.last_force, self.last_acceleration = np.zeros(3), np.zeros(3)
+        self.force = np.zeros(9)
+        """Rope's force at S along {F}: elastic part, its rate, damping part; 3 each."""
+        self.last_force, self.last_acceleration = np.zeros(9), np.zeros(3)
         self.rope = RopeForce(0.0, 0.0, 0.0)
 
     def start(self) -> None:
         """Start in static equilibrium with the deck level, carried to the deck's place at t = 0."""
-        model, scheme, carriage = self.model, self.scheme, self.carriage
+        model, carriage = self.model, self.carriage
         tension = self.scenario.weight
         level = model.to_deck
         undeformed = np.array(self.crane.pulley_position)
@@ -196,38 +211,9 @@ class _Run:
             self.load_velocity = states.velocity[0] + states.rotation[0] @ arm
         if isinstance(self.case.drum, PrescribedDrum):
             self.angle, self.rate = self.case.drum.angle(0.0), self.case.drum.rate(0.0)
-        at_rest = (position * model.mass) @ model.constraints.basis
-        self._evaluate(0, scheme.pulley @ at_rest, np.zeros(3))
+        self.place = self.modal.coordinates(position - model.lengthening @ self.stroke[0, 0])
+        self._evaluate(0, self.pulley @ self.place + self.given @ self.stroke[0, 0], self.given @ self.stroke[1, 0])
         self.last_force, self.last_acceleration = self.force, self.load_acceleration
-        loads = self._carried(0, at_rest, np.zeros_like(at_rest)) + self.force @ scheme.pulley
-        scheme.start(at_rest, np.zeros_like(at_rest), loads)
-
-    def _carried(self, index: int, position: Array, velocity: Array) -> Array:
-        """Generalised forces on the free coordinates, (n_z,): weight, inertial terms of the deck's motion, servomotors.
-
-        The servomotors' are −K P b − L P ḃ; P is M-orthogonal to Z, so that b̈ drops out.
-        """
-        force = self.driving @ self.driven_by[index]
-        if not self.carriage.turns:
-            return np.asarray(force)
-        basis, given = self.model.constraints.basis, self.model.lengthening
-        place = basis @ position + given @ self.stroke[0, index]
-        rate = basis @ velocity + given @ self.stroke[1, index]
-        return np.asarray(force - self.inertial(index, place, rate) @ basis)
-
-    def inertial(self, index: int, position: Array, velocity: Array) -> Array:
-        """e_F of a turning deck beyond the uniform field, (n,)."""
-        if index != self.turned[0]:
-            carriage, inertia = self.carriage, self.inertia
-            turning = carriage.turning[index]
-            self.turned = (
-                index,
-                inertia.constant(np.zeros(3), turning),
-                inertia.blocks(turning),
-                inertia.blocks(carriage.coriolis[index]),
-            )
-        _, constant, centrifugal, coriolis = self.turned
-        return constant + apply_blocks(centrifugal, position) + apply_blocks(coriolis, velocity)
 
     def _evaluate(self, index: int, deflection: Array, deflection_rate: Array) -> None:
         """Find rope force at S (along {F}) and accelerations of load and drum at the present state of these two."""
@@ -250,16 +236,24 @@ class _Run:
         length = self.unstretched + self.radius * self.angle
         hanging_rate = lx * (vx - ux) + ly * (vy - uy) + lz * (vz - uz)
         inboard_rate = hx * (wx - ux) + hy * (wy - uy) + hz * (wz - uz)
+        geometric_rate, unstretched_rate = hanging_rate + inboard_rate, self.radius * self.rate
+        stiffness = self.crane.rope.axial_stiffness / length
         self.rope = rope_force(
             geometric=hanging + inboard,
-            geometric_rate=hanging_rate + inboard_rate,
+            geometric_rate=geometric_rate,
             unstretched=length,
-            unstretched_rate=self.radius * self.rate,
-            stiffness=self.crane.rope.axial_stiffness / length,
+            unstretched_rate=unstretched_rate,
+            stiffness=stiffness,
             damping=scenario.rope_damping,
         )
         tension = self.rope.tension
-        self.force = tension * np.array([lx + hx, ly + hy, lz + hz]) @ turn
+        towards = np.array([lx + hx, ly + hy, lz + hz]) @ turn
+        # How the directions turn is left out of the rate: between its ends the force is none the worse for it.
+        elastic = self.rope.stretch * stiffness if tension else 0.0
+        growth = (
+            stiffness * (geometric_rate - unstretched_rate * (1.0 + self.rope.stretch / length)) if tension else 0.0
+        )
+        self.force = np.outer([elastic, growth, tension - elastic], towards).ravel()
         pull = tension / scenario.load_mass
         self.load_acceleration = np.array([-pull * lx, -pull * ly, -pull * lz - scenario.gravity])
         if isinstance(drum, DrivenDrum):
@@ -272,18 +266,28 @@ class _Run:
 
     def advance(self, index: int) -> None:
         """Step to time ``index``."""
-        scheme, h = self.scheme, self.scheme.step
-        half, quarter = 0.5 * h, 0.25 * h**2
-        load = self.load + h * self.load_velocity + quarter * self.load_acceleration
+        exact, h = self.exact, self.step
+        half, early, late = 0.5 * h, (0.5 - FOX_GOODWIN) * h**2, FOX_GOODWIN * h**2
+        load = self.load + h * self.load_velocity + early * self.load_acceleration
         load_rate = self.load_velocity + half * self.load_acceleration
-        angle = self.angle + h * self.rate + quarter * self.angular_acceleration
+        angle = self.angle + h * self.rate + early * self.angular_acceleration
         rate = self.rate + half * self.angular_acceleration
         drum = self.case.drum
         if isinstance(drum, PrescribedDrum):
             time = float(self.times[index])
             self.angle, self.rate = drum.angle(time), drum.rate(time)
-        place, speed = scheme.predict()
-        acceleration = scheme.acceleration
+        before = self.driven[index - 1] + self.carried.force(index - 1, self.place, self.rates)
+        elastic, growth, damping = self.force.reshape(3, 3) @ self.pulley
+        known = [
+            exact.times(exact.free[row, 0], self.place)
+            + exact.times(exact.free[row, 1], self.rates)
+            + exact.times(exact.cubic[row, 0], elastic)
+            + exact.times(exact.cubic[row, 1], growth)
+            + exact.times(exact.linear[row, 0], before + damping)
+            + exact.times(exact.linear[row, 1], self.driven[index])
+            for row in range(2)
+        ]
+        given = self.given @ self.stroke[:2, index].T
         # c times the rounding of a length is some 1e-16 E_R F_R: ask for no more than that allows.
         tolerance = 1e-11 * self.scenario.weight + 1e-14 * self.crane.rope.axial_stiffness
         # Begin the iteration where force and load go on as they did in the last step.
@@ -291,33 +295,69 @@ class _Run:
         self.force = 2.0 * force - self.last_force
         self.load_acceleration = 2.0 * pulled - self.last_acceleration
         self.last_force, self.last_acceleration = force, pulled
+        place, rates = known
         for _ in range(30 if self.carriage.turns else 1):
-            free = scheme.solve(self._carried(index, *scheme.ends(acceleration)))
-            own = scheme.pulley @ free
-            base = scheme.pulley @ place + quarter * own
-            base_rate = scheme.pulley @ speed + half * own
+            carried = self.carried.force(index, place, rates)
+            begun = [part + exact.times(exact.linear[row, 1], carried) for row, part in enumerate(known)]
+            base = [self.pulley @ part + given[:, row] for row, part in enumerate(begun)]
             for _ in range(60):
-                answer = self.coupling @ self.force
-                before = self.force
-                self.load = load + quarter * self.load_acceleration
+                answer = np.einsum("rkab,kb->ra", self.answer, self.force.reshape(3, 3))
+                felt = self.force
+                self.load = load + late * self.load_acceleration
                 self.load_velocity = load_rate + half * self.load_acceleration
                 if isinstance(drum, DrivenDrum):
-                    self.angle = angle + quarter * self.angular_acceleration
+                    self.angle = angle + late * self.angular_acceleration
                     self.rate = rate + half * self.angular_acceleration
-                self._evaluate(index, base + quarter * answer, base_rate + half * answer)
-                if float(abs(self.force - before).max()) <= tolerance:
+                self._evaluate(index, base[0] + answer[0], base[1] + answer[1])
+                change = np.abs(self.force - felt)
+                if float(max(change[:3].max(), change[6:].max())) <= tolerance:
                     break
             else:
                 raise InvalidValue(
                     f"step = {self.case.step} s: must be smaller, as the rope's force did not converge at "
                     f"t = {self.times[index]:.4f} s"
                 )
-            latest = free + scheme.response @ self.force
-            change = np.max(np.abs(latest - acceleration))
-            acceleration = latest
-            if not self.carriage.turns or change <= 1e-9 * max(1.0, float(np.max(np.abs(latest)))):
+            elastic, growth, damping = self.force.reshape(3, 3) @ self.pulley
+            ends = [
+                part
+                + exact.times(exact.cubic[row, 2], elastic)
+                + exact.times(exact.cubic[row, 3], growth)
+                + exact.times(exact.linear[row, 1], damping)
+                for row, part in enumerate(begun)
+            ]
+            moved = max(float(np.max(np.abs(ends[0] - place))), h * float(np.max(np.abs(ends[1] - rates))))
+            place, rates = ends
+            if not self.carriage.turns or moved <= 1e-9 * max(1.0, float(np.max(np.abs(place)))):
                 break
-        scheme.finish(acceleration)
+        self.place, self.rates = place, rates
+
+
+class _Carried:
+    """Forces on the modes by the deck's turning, beyond the uniform field: less E_1 W + E(W) q + E(2 Ω×) q̇."""
+
+    def __init__(self, carriage: _Carriage, modal: ModalFrame, stroke: Array) -> None:
+        self._turns, self._none = carriage.turns, np.zeros(modal.count)
+        if not carriage.turns:
+            return
+        # W and 2 Ω× along {D}, as the tables of the modal form have them.
+        to_deck = modal.model.to_deck
+        self._turning, self._coriolis = (
+            (to_deck @ part @ to_deck.T).reshape(-1, 9) for part in (carriage.turning, carriage.coriolis)
+        )
+        self._own = np.ascontiguousarray(
+            modal.project(modal.carried).reshape(modal.count, modal.count, 9).transpose(2, 0, 1)
+        )
+        given = modal.project(of_motion(modal.model, modal.model.lengthening)).reshape(modal.count, 2, 9)
+        self._constant = self._turning @ modal.project(modal.turning).reshape(-1, 9).T
+        self._constant += np.einsum("kw,mbw,kb->km", self._turning, given, stroke[0])
+        self._constant += np.einsum("kw,mbw,kb->km", self._coriolis, given, stroke[1])
+
+    def force(self, index: int, place: Array, rates: Array) -> Array:
+        """At time ``index``, of η and η̇, (m,)."""
+        if not self._turns:
+            return self._none
+        own = self._turning[index] @ (self._own @ place) + self._coriolis[index] @ (self._own @ rates)
+        return np.asarray(-self._constant[index] - own)
 
 
 def simulate(case: DynamicCase | None = None, *, model: FrameModel | None = None) -> DynamicResult:
@@ -339,15 +379,15 @@ def simulate(case: DynamicCase | None = None, *, model: FrameModel | None = None
         raise InvalidValue("model: must have been made of the frame of the scenario's crane")
     run = _Run(what, frame)
     run.start()
-    count, size = run.outputs + 1, run.scheme.position.size
-    states = np.zeros((count, 2, size))
+    count = run.outputs + 1
+    states = np.zeros((count, 2, run.modal.count))
     body = np.zeros((count, 11))
     forces = np.zeros((count, 3))
 
     def store(output: int) -> None:
-        states[output] = run.scheme.position, run.scheme.velocity
+        states[output] = run.place, run.rates
         body[output] = [*run.load, *run.load_velocity, *run.rope, run.angle, run.rate]
-        forces[output] = run.force
+        forces[output] = run.force[:3] + run.force[6:]
 
     store(0)
     for output in range(1, count):
@@ -356,13 +396,15 @@ def simulate(case: DynamicCase | None = None, *, model: FrameModel | None = None
         store(output)
 
     kept = slice(0, None, run.inner)
-    full = states @ frame.constraints.basis.T
+    full = states @ run.modal.shape.T
     stroke = run.stroke[:, kept]
     full += (stroke[:2] @ frame.lengthening.T).transpose(1, 0, 2)
-    force = run.carriage.field[kept] @ run.uniform.T + forces @ frame.pulley
+    force = run.carriage.field[kept] @ frame.uniform_field().T + forces @ frame.pulley
     if run.carriage.turns:
-        for output in range(count):
-            force[output] -= run.inertial(output * run.inner, *full[output])
+        for output, (position, velocity) in enumerate(full):
+            turning, coriolis = (part[output * run.inner] for part in (run.carriage.turning, run.carriage.coriolis))
+            force[output] -= frame.slices.of_field(turning) + frame.slices.of_motion(turning, position)
+            force[output] -= frame.slices.of_motion(coriolis, velocity)
     frame.warn_of_rotation(full[:, 0])
     return DynamicResult(
         case=what,

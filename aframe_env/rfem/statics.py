@@ -11,6 +11,7 @@ import numpy as np
 from aframe_env.rfem.banded import BandedCholesky
 from aframe_env.rfem.beam import Array
 from aframe_env.rfem.model import DOWN, FrameModel, frame_model
+from aframe_env.rfem.second_order import Geometry, stiffened
 from aframe_env.rfem.section_forces import Cut, PointForce, SectionForces, von_mises
 from aframe_env.rfem.structure import members_of
 from aframe_env.scenario.crane import GRAVITY, Vector
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 
 LOADED_POINTS = ("S", "N_R", "N_L", "B_R", "B_L")
 """Points that a load case may load and whose deflection comes out."""
+
+SECOND_ORDER_ITERATIONS = 50
+"""Most iterations to an equilibrium of second order; each gains two digits or so."""
 
 ADJOINING = 0.1
 """Length over which :meth:`StaticResult.reference_case` averages N, V and T beside a point, m: one element
@@ -37,9 +41,15 @@ class LoadCase:
     """Point (one of S, N_R, N_L, B_R, B_L) → force in {D}, N."""
     rope_tension: float = 0.0
     """Tension at S along both rope legs, N, 0 or more: down to the load and towards the drum."""
+    second_order: bool = False
+    """Whether the frame gives way by what is of second order in its displacements too (P–Δ)."""
+    rope_follows: bool = False
+    """Whether the rope between S and the drum turns as S moves; with ``second_order`` only."""
 
     def __post_init__(self) -> None:
         require_number("rope_tension", self.rope_tension, "N", low=0.0)
+        if self.rope_follows and not self.second_order:
+            raise InvalidValue("rope_follows = True: only with second_order = True")
         for name, force in self.forces.items():
             require_choice("forces", name, LOADED_POINTS)
             require_vector(f"forces.{name}", force, "N")
@@ -200,13 +210,78 @@ def solve(model: FrameModel, right: Array, lengthening: Array | None = None) -> 
     """q, (n,), of the frame at rest under the generalised forces ``right``, (n,); ``lengthening`` is the change of
     the lengths of S_R and S_L, (2,), m, where they are rigid."""
     basis = model.constraints.basis
-    given = np.zeros_like(right) if lengthening is None else model.lengthening @ lengthening
-    free = BandedCholesky(model.reduced_stiffness).solve(basis.T @ (right - model.stiffness @ given))
+    given = 0.0 if lengthening is None else model.lengthening @ lengthening
+    free = BandedCholesky(model.reduced_stiffness).solve(basis.T @ right)
     return np.asarray(basis @ free + given, dtype=np.float64)
 
 
+@dataclass(frozen=True)
+class _State:
+    """A frame at rest under generalised forces ``right``, those of second order included."""
+
+    model: FrameModel
+    position: Array
+    right: Array
+    lengthening: Array
+    """Of S_R and S_L by what is of second order, (2,), m."""
+
+    @property
+    def tensions(self) -> Array:
+        """Of S_R and S_L, (2,), N."""
+        stiffness = self.model.frame.structure.servomotor.stiffness or 0.0
+        linear = self.model.servomotor_tensions(self.position, np.zeros_like(self.position), self._reactions)
+        return np.asarray(linear + stiffness * self.lengthening)
+
+    @property
+    def feet(self) -> Array:
+        """Forces on the frame at A_R and A_L along {D}, (2, 3), N."""
+        return self.model.foot_reactions(self._reactions)
+
+    @property
+    def _reactions(self) -> Array:
+        return self.model.reactions(self.model.stiffness @ self.position - self.right)
+
+
+def _to_second_order(state: _State, forces: Mapping[str, Array], rope: tuple[float, Array] | None) -> _State:
+    """The state with what is of second order in its displacements.
+
+    Args:
+        state: The linear one.
+        forces: Dead forces along {F} at named points, N.
+        rope: Tension [N] and line from S to the drum along {F} [m] where the rope turns with S.
+    """
+    linear, right = state.model, state.right
+    geometry, stiffness = Geometry(linear), linear.structure.stiffness()
+    elastic = linear.frame.structure.servomotor.stiffness
+    for _ in range(SECOND_ORDER_ITERATIONS):
+        before = state.position
+        bent = geometry.deformations(before)
+        springs = linear.spring_forces(before) + bent * stiffness.reshape(-1, 6)
+        feet = dict(zip(("A_R", "A_L"), state.feet @ linear.to_deck, strict=True))
+        total = geometry.stiffness(springs, state.tensions, {**forces, **feet})
+        if rope is not None:
+            total = total + geometry.of_rope(*rope)
+        model = stiffened(linear, total)
+        longer = geometry.lengthening(before)
+        loads = right - linear.deformation.T @ (stiffness * bent.ravel())
+        try:
+            if elastic is None:
+                position = solve(model, loads, -longer)
+            else:
+                loads = loads + (elastic * longer) @ linear.servomotors
+                position = solve(model, loads)
+        except np.linalg.LinAlgError:
+            raise InvalidValue("second_order: the frame buckles under these loads") from None
+        state = _State(model, position, loads, longer)
+        if np.max(np.abs(position - before)) < 1e-9 * np.max(np.abs(position)):
+            return state
+    raise InvalidValue(
+        f"second_order: no equilibrium in {SECOND_ORDER_ITERATIONS} iterations: the frame buckles under these loads"
+    )
+
+
 def static(crane: Crane, case: LoadCase, *, model: FrameModel | None = None) -> StaticResult:
-    """Solve a static load case, linear in the frame.
+    """Solve a static load case, linear in the frame or to second order.
 
     Args:
         crane: The crane.
@@ -222,11 +297,13 @@ def static(crane: Crane, case: LoadCase, *, model: FrameModel | None = None) -> 
     forces = point_forces(crane, case)
     field_strength = GRAVITY if case.own_weight else 0.0
     right = generalised_forces(frame, forces) + frame.weight(field_strength)
-    position = solve(frame, right)
+    state = _State(frame, solve(frame, right), right, np.zeros(2))
+    if case.second_order:
+        to_drum = np.array(crane.drum_position) - np.array(crane.pulley_position)
+        rope = (case.rope_tension, frame.to_deck.T @ to_drum) if case.rope_follows else None
+        state = _to_second_order(state, {name: frame.to_deck.T @ force for name, force in forces.items()}, rope)
+    position, tensions, feet = state.position, state.tensions, state.feet
     frame.warn_of_rotation(position)
-    reactions = frame.reactions(frame.stiffness @ position - right)
-    tensions = frame.servomotor_tensions(position, np.zeros_like(position), reactions)
-    feet = frame.foot_reactions(reactions)
     structure, to_deck = frame.structure, frame.to_deck
 
     loads = dict(forces)

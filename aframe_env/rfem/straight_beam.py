@@ -7,18 +7,18 @@ import math
 from typing import Literal, TypeAlias
 
 import numpy as np
+import scipy
 
 from aframe_env.rfem.beam import Array, Member, divide
 from aframe_env.rfem.constraints import local_basis
+from aframe_env.rfem.slices import slices_of
 from aframe_env.rfem.structure import Structure, body_of
 from aframe_env.validation import require_choice
 
 End: TypeAlias = Literal["pinned", "clamped", "free"]
 
 
-def bending_frequencies(
-    member: Member, elements: int, ends: tuple[End, End], *, corrected_shear: bool = False
-) -> Array:
+def bending_frequencies(member: Member, elements: int, ends: tuple[End, End], *, corrected_shear: bool = True) -> Array:
     """Natural frequencies of bending along the section's axis 3, lowest first, Hz.
 
     Args:
@@ -34,6 +34,7 @@ def bending_frequencies(
         springs=tuple(springs),
         spring_bodies=tuple((index, index + 1) for index in range(len(springs))),
         joints=(),
+        corrected=corrected_shear,
         points={"first": (0, member.start), "last": (len(bodies) - 1, member.end)},
     )
     deformation = structure.deformation().toarray()
@@ -48,6 +49,8 @@ def bending_frequencies(
         if end == "clamped":
             rows.append((member.axes.T @ structure.rotation(name))[1:2])
     held = np.vstack(rows)[:, plane]
-    basis = local_basis(held, structure.mass()[plane], coordinates=2)
-    squares = np.linalg.eigvalsh(basis.T @ stiffness[np.ix_(plane, plane)] @ basis)
+    mass = slices_of(structure).mass_matrix().toarray()[np.ix_(plane, plane)]
+    basis = local_basis(held, np.diag(mass), coordinates=2)
+    reduced = (basis.T @ matrix @ basis for matrix in (stiffness[np.ix_(plane, plane)], mass))
+    squares = scipy.linalg.eigh(*reduced, eigvals_only=True)
     return np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi)

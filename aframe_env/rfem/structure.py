@@ -1,7 +1,7 @@
 """The frame as a set of rfes and sdes: right leg, top beam and left leg, eqs. (8)–(22).
 
 Every rfe has six generalised coordinates, eq. (9): the displacement of its centre of mass and a small
-rotation, both along its own undeformed principal central axes (needed for the mass matrix (14) to be
+rotation, both along its own undeformed principal central axes (needed for the paper's mass matrix (14) to be
 diagonal). The corner rfes, shared by a leg and the beam, are L-shaped, so their principal axes are turned.
 """
 
@@ -100,20 +100,23 @@ class Structure:
     """Pairs of bodies that constraints hold rigidly together, with the place in {F}."""
     points: dict[str, tuple[int, Array]]
     """Named point → (index of the body it moves with, undeformed place in {F})."""
+    corrected: bool
+    """Whether the shear of the sdes is corrected, see :func:`aframe_env.rfem.beam.divide`."""
 
     @property
     def size(self) -> int:
         """Number of generalised coordinates of the frame, 6 a body."""
         return 6 * len(self.bodies)
 
-    def mass(self) -> Array:
-        """Diagonal of M_F, (n,), kg and kg m²; eq. (14)."""
-        return np.concatenate([np.concatenate([np.full(3, body.mass), body.inertia]) for body in self.bodies])
+    @property
+    def elements(self) -> list[tuple[Spring, tuple[int, int]]]:
+        """Every sde with the bodies before and behind it."""
+        return list(zip(self.springs, self.spring_bodies, strict=True))
 
     def deformation(self) -> scipy.sparse.csr_array:
         """(6 n_sde, n): deformation of every sde along its member's axes (behind minus before)."""
         matrix = scipy.sparse.lil_array((6 * len(self.springs), self.size))
-        for row, (spring, (before, behind)) in enumerate(zip(self.springs, self.spring_bodies, strict=True)):
+        for row, (spring, (before, behind)) in enumerate(self.elements):
             to_member = spring.member.axes.T
             for index, sign in ((before, -1.0), (behind, 1.0)):
                 body = self.bodies[index]
@@ -220,7 +223,7 @@ def named_points(
     return points
 
 
-def one_chain(frame: Frame, division: Division, *, corrected_shear: bool = False) -> Structure:
+def one_chain(frame: Frame, division: Division, *, corrected_shear: bool = True) -> Structure:
     """Build the paper's new model: one beam of n_1 + n_2 + n_3 + 1 rfes, the corner ones shared."""
     segments: list[tuple[Segment, ...]] = []
     springs: list[Spring] = []
@@ -237,11 +240,12 @@ def one_chain(frame: Frame, division: Division, *, corrected_shear: bool = False
         springs=tuple(springs),
         spring_bodies=tuple((index, index + 1) for index in range(len(springs))),
         joints=(),
+        corrected=corrected_shear,
         points=named_points(frame, bodies, corners, corners),
     )
 
 
-def three_beams(frame: Frame, division: Division, *, corrected_shear: bool = False) -> Structure:
+def three_beams(frame: Frame, division: Division, *, corrected_shear: bool = True) -> Structure:
     """Build the paper's previous model: right leg, top beam and left leg, each a beam of its own with n + 1 rfes.
 
     It has the same sdes as ``one_chain``; the corner rfes are split in two halves that a rigid joint at B_R and B_L
@@ -262,5 +266,6 @@ def three_beams(frame: Frame, division: Division, *, corrected_shear: bool = Fal
         springs=tuple(springs),
         spring_bodies=tuple(pairs),
         joints=tuple(joints),
+        corrected=corrected_shear,
         points=named_points(frame, bodies, (leg_end, beam_end + 1), (leg_end + 1, beam_end)),
     )

@@ -1,10 +1,4 @@
-"""Constants of a frame in the form that the kernels read: for one length of the inner step, and for the readout.
-
-Newmark's scheme with γ = 1/2, and β for each mode by itself: with x = ωh up to EXACT_PHASE, β = 1/(4 sin²(x/2)) - 1/x²
-gives the mode its own frequency exactly; above it β = 1/4, average acceleration, whatever the step. The load takes
-β = 1/12 (Fox and Goodwin), fourth order in its phase. For constant β ≤ 1/4 + 1/x² on every coordinate the scheme
-keeps a quadratic invariant of the coupled undamped system, positive while (ω_rope h)² is well below 6.
-"""
+"""Constants of a frame in the form that the kernels read: for one length of the inner step, and for the readout."""
 
 from __future__ import annotations
 
@@ -14,65 +8,52 @@ import numpy as np
 
 from aframe_env.dynamics.flexible import layout as at
 from aframe_env.rfem.beam import Array
+from aframe_env.rfem.exact_step import exact_step
 from aframe_env.rfem.model import FrameModel
 from aframe_env.rfem.reduction import ModalFrame, modal_frame
 from aframe_env.rfem.structure import Division
 from aframe_env.scenario.crane import Frame
-
-EXACT_PHASE = 1.0
-"""Largest ωh for which a mode's frequency is made exact."""
-DIAGONAL = 1e-9
-"""Share of the damping's diagonal up to which what lies off it is rounding."""
-
-
-def newmark_beta(square: Array, step: float) -> Array:
-    """β of each mode, (m,), of ω² [1/s²] (m,) and h [s]."""
-    phase = np.sqrt(np.maximum(square, 0.0)) * step
-    x = np.clip(phase, 0.05, EXACT_PHASE)
-    exact = 0.25 / np.sin(0.5 * x) ** 2 - 1.0 / x**2
-    # Below 0.05 the difference of two large numbers: its series instead.
-    exact = np.where(phase < 0.05, 1.0 / 12.0 + phase**2 / 240.0, exact)
-    return np.where(phase <= EXACT_PHASE, exact, 0.25)
-
-
-def couples(modal: ModalFrame) -> bool:
-    """Return whether the damping couples the modes (normal and tangential not in the ratio of E to G)."""
-    diagonal = np.diag(modal.damping)
-    return bool(np.max(np.abs(modal.damping - np.diag(diagonal))) > DIAGONAL * np.max(diagonal, initial=1e-300))
 
 
 @lru_cache(maxsize=16)
 def step_table(frame: Frame, division: Division, modes: int | None, step: float) -> Array:
     """Constants of a frame's step of length ``step`` [s], (size,); see ``layout``."""
     modal = modal_frame(frame, division, modes)
-    count, carried, coupled = modal.count, modal.carried_count, couples(modal)
-    pulley = modal.pulley @ modal.shape
-    beta = newmark_beta(modal.square, step)
-    late = beta * step**2
-    damping = modal.damping if coupled else np.diag(np.diag(modal.damping))
-    inverse = np.linalg.inv(np.eye(count) + 0.5 * step * damping + np.diag(late * modal.square))
-    response = inverse @ pulley.T
+    count, carried = modal.count, modal.carried_count
+    exact, pulley = exact_step(modal, step), modal.pulley @ modal.shape
+    # Place and rate of the modes by the rope's force at S at the end: elastic part, its rate, the rest.
+    response = np.array(
+        [
+            [
+                exact.times(factor, pulley.T)
+                for factor in (exact.cubic[row, 2], exact.cubic[row, 3], exact.linear[row, 1])
+            ]
+            for row in range(2)
+        ]
+    )
+    give = pulley @ response
 
     head = np.zeros(at.HEAD)
-    head[at.COUNT], head[at.CARRIED_COUNT], head[at.COUPLED], head[at.STEP] = count, carried, coupled, step
-    head[at.COMPLIANCE : at.COMPLIANCE + 9] = ((pulley * late) @ response).ravel()
-    head[at.COMPLIANCE_RATE : at.COMPLIANCE_RATE + 9] = (0.5 * step * pulley @ response).ravel()
+    head[at.COUNT], head[at.CARRIED_COUNT], head[at.COUPLED], head[at.STEP] = count, carried, modal.couples, step
+    head[at.GIVE : at.GIVE + 27], head[at.GIVE_RATE : at.GIVE_RATE + 27] = give.reshape(2, 27)
     head[at.REST : at.REST + 9] = ((pulley / modal.square) @ pulley.T).ravel()
 
     of_modes = np.zeros((count, at.MODE_SIZE))
     of_modes[:, at.SQUARE] = modal.square
     of_modes[:, at.DAMPING] = np.diag(modal.damping)
-    of_modes[:, at.LATE] = late
-    of_modes[:, at.EARLY] = (0.5 - beta) * step**2
-    of_modes[:, at.INVERSE] = np.diag(inverse)
     of_modes[:, at.SHAPE : at.SHAPE + 3] = pulley.T
-    of_modes[:, at.RESPONSE : at.RESPONSE + 3] = response
+    of_modes[:, at.RESPONSE : at.RESPONSE + 18] = response.transpose(2, 0, 1, 3).reshape(count, 18)
     of_modes[:, at.FIELD : at.FIELD + 3] = modal.project(modal.uniform)
     of_modes[:, at.FIELD + 3 : at.FIELD + 12] = -modal.project(modal.turning).reshape(count, 9)
     matrix = -modal.project(modal.carried)[:carried]
     parts = [head, of_modes.ravel(), matrix.ravel()]
-    if coupled:
-        parts.append(np.asarray(inverse.ravel(), dtype=np.float64))
+    factors = np.concatenate([exact.free, exact.linear, exact.cubic[:, :2]], axis=1)
+    if modal.couples:
+        parts.append(factors.ravel())
+    else:
+        for slot, kinds in ((at.FREE, slice(0, 2)), (at.LINEAR, slice(2, 4)), (at.CUBIC, slice(4, 6))):
+            of_modes[:, slot : slot + 4] = factors[:, kinds].reshape(4, count).T
+        parts[1] = of_modes.ravel()
     return np.concatenate(parts)
 
 
@@ -134,6 +115,7 @@ def readout_table(frame: Frame, division: Division, modes: int | None) -> Array:
         strain * model.structure.stiffness(),
         strain * damping,
         points,
+        (model.fixed_end_forces @ model.to_deck.T).transpose(2, 0, 1),
         reach,
         turned,
     ]

@@ -46,7 +46,6 @@ def test_equal_strokes_luff_the_frame_as_a_rigid_body(layout, leg):
         assert found == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
     assert np.abs(frame.deformation @ moved).max() < 1e-12 * stroke
     assert np.abs(frame.stiffness @ moved).max() < 1.0
-    assert not (frame.pulley @ frame.lengthening).any()
 
 
 def test_range_of_a_stroke_is_as_stated():
@@ -73,7 +72,7 @@ def test_slow_stroke_ends_in_the_static_solution():
     strokes = (Stroke.smooth(STROKE, 4.0), Stroke.smooth(0.0, 1.0))
     history = simulate(DynamicCase(scenario=LIGHT, strokes=strokes, duration=5.0, step=5e-3), model=frame).frame
     matrix, size = frame.constraints.matrix, frame.structure.size
-    system = np.block([[frame.stiffness, -matrix.T], [matrix, np.zeros((len(matrix),) * 2)]])
+    system = np.block([[frame.stiffness.toarray(), -matrix.T], [matrix, np.zeros((len(matrix),) * 2)]])
     scale = np.concatenate([np.full(size, 1e-4), np.full(len(matrix), 1e4)])
     target = np.zeros(len(matrix))
     target[0] = -STROKE

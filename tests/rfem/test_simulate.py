@@ -41,7 +41,7 @@ def test_instant_release_is_a_sum_of_modes():
     frame = model(5, 2)
     history = release(Crane(), CASES["V"], duration=0.5, step=2e-5, output_interval=0.01, model=frame)
     modes = frame_modes(Crane(), 70, model=frame)
-    amplitude = modes.shape.T @ (frame.mass * history.position[0])
+    amplitude = modes.shape.T @ (frame.mass @ history.position[0])
     swings = np.cos(np.outer(history.time, 2 * math.pi * modes.frequency))
     pulley = (swings * amplitude) @ (frame.to_deck @ frame.pulley @ modes.shape).T
     assert np.abs(history.displacement("S") - pulley).max() < 2e-3 * np.abs(pulley).max()

@@ -18,7 +18,7 @@ from train.verify.frame_checks import CASES, DETERMINATE, flat, model
 
 @pytest.fixture(scope="module")
 def fine():
-    return model(20, 16)
+    return model(20, 16, corrected_shear=False)
 
 
 def test_mass_and_counts_of_unknowns():

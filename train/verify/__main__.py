@@ -76,6 +76,7 @@ CHECKS: Sequence[Callable[[], Check | list[Check]]] = (
     frame_checks.previous_model,
     run_checks.releases,
     run_checks.paper_case,
+    run_checks.shocks,
     run_checks.stiff_frame,
     run_checks.energy,
     run_checks.steps,

@@ -26,10 +26,10 @@ from aframe_env.validation import InvalidValue, require_choice, require_number, 
 FORMAT = """\
 Files are TOML, SI units. Keys of every kind of file (all optional):
 
-  rfes = [120, 100]            primary elements of a leg and of the top beam (the beam's even);
-                               for a dynamic run the default is [20, 16]
+  rfes = [120, 100]            primary elements of a leg and of the top beam (the beam's even)
   layout = "one_chain"         or "three_beams", the paper's previous model
-  corrected_shear = false      true: static deflections exact at any number of elements
+  corrected_shear = true       static deflections exact at any number of elements, and a mass that is
+                               consistent with them; false: the paper's elements
 
 --load-case and --release, the crane:
   servomotors = "rigid"        or "elastic", then also
@@ -41,6 +41,8 @@ Files are TOML, SI units. Keys of every kind of file (all optional):
 --load-case, static:
   own_weight = true            own weight of legs and beam
   rope_tension = 0.0           N, at S along both rope legs: down to the load, and to the drum
+  second_order = false         true: what is of second order in the displacements too (P-Delta)
+  rope_follows = false         true: the rope to the drum turns as S moves; with second_order only
   [forces]                     N, in {D}: x outboard, z up
   S = [0.0, 0.0, -981000.0]    and N_R, N_L, B_R, B_L
 
@@ -76,10 +78,14 @@ its own weight stays; undamped:
   damping = 0.0                N s/m, each
 """
 
+FINE = Division(leg=120, beam=100)
+"""The default division: elements of 0.1 m in the reference crane."""
+
 _MODEL = {"rfes", "layout", "corrected_shear"}
 _RUN = {"duration", "output_interval", "step"}
 _CRANE = {"servomotors", "servomotor_stiffness", "servomotor_damping", "frame"}
 _STATIC = {"own_weight", "rope_tension", "forces"}
+_SECOND_ORDER = {"second_order", "rope_follows"}
 
 
 def _only(data: Mapping[str, Any], allowed: set[str], where: str = "") -> None:
@@ -130,9 +136,9 @@ def crane_of(data: Mapping[str, Any]) -> Crane:
     return Crane(frame=frame)
 
 
-def model_of(data: Mapping[str, Any], crane: Crane, default: tuple[int, int]) -> FrameModel:
+def model_of(data: Mapping[str, Any], crane: Crane) -> FrameModel:
     """Frame model with the file's division."""
-    rfes = data.get("rfes", list(default))
+    rfes = data.get("rfes", [FINE.leg, FINE.beam])
     if not isinstance(rfes, list) or len(rfes) != 2:
         raise InvalidValue(f"rfes = {shown(rfes)}: must be two integers, [elements of a leg, elements of the beam]")
     layout = data.get("layout", "one_chain")
@@ -140,7 +146,7 @@ def model_of(data: Mapping[str, Any], crane: Crane, default: tuple[int, int]) ->
         crane.frame,
         Division(leg=rfes[0], beam=rfes[1]),
         layout=layout,
-        corrected_shear=_flag(data, "corrected_shear", False),
+        corrected_shear=_flag(data, "corrected_shear", True),
     )
 
 
@@ -151,14 +157,15 @@ def _load_case(data: Mapping[str, Any]) -> LoadCase:
         own_weight=_flag(data, "own_weight", True),
         forces={name: tuple(value) if isinstance(value, list) else value for name, value in forces.items()},
         rope_tension=_number(data, "rope_tension", 0.0, "N", low=0.0),
+        **{name: _flag(data, name, False) for name in sorted(_SECOND_ORDER)},
     )
 
 
 def static_case(data: Mapping[str, Any]) -> dict[str, object]:
     """Solve a static case: the keys of the reference data's cases, and the section forces along the frame."""
-    _only(data, _MODEL | _CRANE | _STATIC)
+    _only(data, _MODEL | _CRANE | _STATIC | _SECOND_ORDER)
     crane = crane_of(data)
-    result = static(crane, _load_case(data), model=model_of(data, crane, (120, 100)))
+    result = static(crane, _load_case(data), model=model_of(data, crane))
     report = result.reference_case()
     report["units"] = "N, m, rad, N m, Pa; deck frame D"
     report["along"] = [
@@ -202,7 +209,7 @@ def release_case(data: Mapping[str, Any]) -> dict[str, object]:
         duration=_number(data, "duration", 2.0, "s", low=0.0, low_open=True),
         step=_number(data, "step", 1e-4, "s", low=0.0, low_open=True),
         output_interval=_number(data, "output_interval", 5e-3, "s", low=0.0, low_open=True),
-        model=model_of(data, crane, (120, 100)),
+        model=model_of(data, crane),
     )
     return {name: column.tolist() for name, column in columns_of(history).items()}
 
@@ -218,7 +225,7 @@ def dynamic_case(data: Mapping[str, Any], folder: Path = Path()) -> dict[str, ob
     _only(data, _MODEL | _RUN | keys)
     scenario = scenario_of({name: value for name, value in data.items() if name in keys}, folder, "scenario")
     case = DynamicCase(scenario=scenario, **{name: data[name] for name in _RUN if name in data})
-    result = simulate(case, model=model_of(data, scenario.crane, (20, 16)))
+    result = simulate(case, model=model_of(data, scenario.crane))
     return {name: column.tolist() for name, column in dynamic_columns(result).items()}
 
 

@@ -100,7 +100,7 @@ def moment_error(case: dict[str, Any], reference: dict[str, Any]) -> float:
     return max(errors)
 
 
-def model(leg: int, beam: int, *, corrected_shear: bool = False, layout: Layout = "one_chain") -> FrameModel:
+def model(leg: int, beam: int, *, corrected_shear: bool = True, layout: Layout = "one_chain") -> FrameModel:
     """The reference frame."""
     division = Division(leg=leg, beam=beam)
     return frame_model(Crane().frame, division, corrected_shear=corrected_shear, layout=layout)
@@ -111,7 +111,9 @@ def beam_frequencies() -> Check:
     member, rows, passed, slowest = straight_member(), [], True, math.inf
     for ends, table in BEAM_ERRORS.items():
         exact = exact_frequencies(member, ends, 3)
-        errors = {n: (bending_frequencies(member, n, ends)[:3] / exact - 1.0) * 100.0 for n in table}
+        errors = {
+            n: (bending_frequencies(member, n, ends, corrected_shear=False)[:3] / exact - 1.0) * 100.0 for n in table
+        }
         for n, allowed in table.items():
             for mode in range(3):
                 text = f"{allowed[mode]:g}"
@@ -128,7 +130,7 @@ def beam_frequencies() -> Check:
             )
         slowest = min(slowest, *(order(errors[20][mode], errors[40][mode]) for mode in range(3)))
     return Check(
-        name="straight beam, first three bending frequencies",
+        name="straight beam of the paper's elements, first three bending frequencies",
         bar="errors not above the table's; second order",
         measured=f"as the table; order {slowest:.3f} at least",
         passed=passed and slowest > 1.9,
@@ -167,16 +169,16 @@ def static_errors(frame: FrameModel, name: str) -> dict[str, float]:
 
 
 def static_frame() -> list[Check]:
-    """Check deflections, rotations and moments at 20/16, their order, and the corrected stiffness at 5/2."""
+    """Check deflections, rotations and moments at 20/16, their order, and the corrected elements at 5/2."""
     checks = []
     for title, bar, limit, frame in (
-        ("static frame at 20/16 rfes", "≤ 0.5 % of the finite-element figure", 5e-3, model(20, 16)),
         (
-            "static frame at 5/2 rfes, corrected stiffness",
-            "≤ 0.1 %",
-            1e-3,
-            model(5, 2, corrected_shear=True),
+            "static frame of the paper's elements, 20/16 rfes",
+            "≤ 0.5 % of the finite-element figure",
+            5e-3,
+            model(20, 16, corrected_shear=False),
         ),
+        ("static frame at 5/2 rfes", "≤ 0.1 %", 1e-3, model(5, 2)),
     ):
         rows, worst = [], 0.0
         for name, case in CASES.items():
@@ -205,7 +207,7 @@ def _static_order() -> Check:
     reference = np.array(static_cases()["V"]["u_S_D"])
     rows, errors = [], []
     for division in ((5, 4), (10, 8), (20, 16), (40, 32)):
-        here = static(Crane(), CASES["V"], model=model(*division)).displacement["S"]
+        here = static(Crane(), CASES["V"], model=model(*division, corrected_shear=False)).displacement["S"]
         errors.append((here - reference)[[0, 2]] / reference[[0, 2]])
         rows.append(
             Row(
@@ -216,10 +218,11 @@ def _static_order() -> Check:
             )
         )
     orders = [order(a[k], b[k]) for a, b in pairwise(errors) for k in range(2)]
-    twin = static(Crane(), CASES["V"], model=model(20, 20)).displacement["S"][0] * 1e3
+    equal = model(20, 20, corrected_shear=False)
+    twin = static(Crane(), CASES["V"], model=equal).displacement["S"][0] * 1e3
     rows.append(_row("V, 20/20: u_S x, mm, against program B's equal mesh", float(twin), 24.7184))
     return Check(
-        name="static frame: convergence",
+        name="static frame of the paper's elements: convergence",
         bar="second order; program B's 24.7184 mm at its mesh of 20",
         measured=f"order {min(orders):.2f} … {max(orders):.2f}; {twin:.4f} mm",
         passed=min(orders) > 1.9 and abs(twin - 24.7184) < 6e-5,
@@ -227,22 +230,26 @@ def _static_order() -> Check:
     )
 
 
-def natural_modes() -> Check:
-    """Check the first ten natural frequencies."""
-    reference = natural_frequencies()
-    here: Array = frame_modes(Crane(), 10, model=model(20, 16)).frequency
-    errors = here / reference - 1.0
-    worst = float(np.max(np.abs(errors)))
-    return Check(
-        name="first ten natural frequencies at 20/16 rfes",
-        bar="≤ 0.25 %",
-        measured=f"{worst:.3%} at worst",
-        passed=worst <= 2.5e-3,
-        rows=[
-            Row(quantity=f"f{k + 1}, Hz", measured=f"{a:.4f}", reference=f"{b:.4f}", error=f"{e:.3%}")
-            for k, (a, b, e) in enumerate(zip(here, reference, errors, strict=True))
-        ],
-    )
+def natural_modes() -> list[Check]:
+    """Check the first ten natural frequencies at 20/16."""
+    reference, checks = natural_frequencies(), []
+    for title, corrected, bar in (("of the paper's elements, ", False, 2.5e-3), ("", True, 1e-3)):
+        here: Array = frame_modes(Crane(), 10, model=model(20, 16, corrected_shear=corrected)).frequency
+        errors = here / reference - 1.0
+        worst = float(np.max(np.abs(errors)))
+        checks.append(
+            Check(
+                name=f"first ten natural frequencies {title}20/16 rfes",
+                bar=f"≤ {bar * 100:g} %",
+                measured=f"{worst:.3%} at worst",
+                passed=worst <= bar,
+                rows=[
+                    Row(quantity=f"f{k + 1}, Hz", measured=f"{a:.4f}", reference=f"{b:.4f}", error=f"{e:.3%}")
+                    for k, (a, b, e) in enumerate(zip(here, reference, errors, strict=True))
+                ],
+            )
+        )
+    return checks
 
 
 def previous_model() -> Check:

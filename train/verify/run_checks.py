@@ -7,6 +7,9 @@ from functools import cache
 
 import numpy as np
 
+from aframe_env.dynamics import layout as at
+from aframe_env.dynamics.flexible.readout import FEET, SERVOMOTORS
+from aframe_env.flexible_engine import FRAME_DIVISION, FRAME_MODES, FlexibleEngine, Mesh
 from aframe_env.rfem.beam import Array
 from aframe_env.rfem.energy import energy_balance
 from aframe_env.rfem.reference import time_series
@@ -15,7 +18,7 @@ from aframe_env.rfem.simulate import DynamicCase, DynamicResult, simulate
 from aframe_env.scenario import Scenario
 from aframe_env.scenario.crane import Crane
 from aframe_env.scenario.motion import COORDINATES, Harmonic, HarmonicMotion
-from train.verify.cases import columns_of, dynamic_columns
+from train.verify.cases import FINE, columns_of, dynamic_columns
 from train.verify.frame_checks import CASES, model, order
 from train.verify.report import Check, Row
 
@@ -64,9 +67,9 @@ def ramp_release(leg: int = 120, beam: int = 100) -> Comparison:
 
 
 @cache
-def paper_run(step: float = 2.5e-3) -> DynamicResult:
-    """Simulate the paper's motion (42), drum still, at 20/16."""
-    return simulate(DynamicCase(step=step), model=model(20, 16))
+def paper_run() -> DynamicResult:
+    """Simulate the paper's motion (42), drum still, as the command does by default."""
+    return simulate(DynamicCase(), model=model(FINE.leg, FINE.beam))
 
 
 def releases() -> Check:
@@ -94,20 +97,6 @@ def releases() -> Check:
     )
 
 
-def _sag(both: Comparison) -> str:
-    """Explain why the deflection of S differs by more than the load's place does."""
-    names = ("uS1_m", "uS3_m")
-    whole = " and ".join(f"{both.error(name):.2%}" for name in names)
-    static = " and ".join(f"{abs(both.offset(name) / np.mean(both.there[name])):.2%}" for name in names)
-    rest = " and ".join(f"{both.error_about_mean(name):.2%}" for name in names)
-    return (
-        f"The deflection of S, figure 11, differs by {whole} of its peak-to-peak, outboard and upwards. Nearly all of "
-        f"it is constant: at 20/16 rfes the frame sags by {static} less than the finite elements, as in the static "
-        "case L1 above (the corrected stiffness takes that away), and the sag is several times the peak-to-peak that "
-        f"it is referred to. Less that constant, the histories are within {rest}."
-    )
-
-
 def paper_case() -> list[Check]:
     """Check full against simplified model, and forces, as the independent program has them."""
     there, rigid = time_series("paper_flexible"), time_series("paper_rigid")
@@ -119,7 +108,7 @@ def paper_case() -> list[Check]:
     forces = max(both.error(column) for column in REACTIONS)
     return [
         Check(
-            name="paper's case, 60 s: x_L3 full − simplified (fig. 14), 20/16 rfes",
+            name="paper's case, 60 s: x_L3 full − simplified (fig. 14)",
             bar="the independent program's difference within 1 % of it",
             measured=f"{largest * 1e3:.2f} mm; the histories of it within {apart:.2%}",
             passed=abs(largest / target - 1.0) <= 0.01 and apart <= 0.01,
@@ -131,26 +120,84 @@ def paper_case() -> list[Check]:
                     error=f"{largest / target - 1.0:.3%}",
                 ),
                 *both.rows(("xL1_m", "xL3_m", "uS1_m", "uS3_m")),
-                *(
-                    Row(
-                        quantity=f"{column}, less the mean difference",
-                        measured=f"mean difference {both.offset(column) * 1e3:+.3f} mm",
-                        reference=f"mean {np.mean(there[column]) * 1e3:.2f} mm",
-                        error=f"{both.error_about_mean(column):.3%}",
-                    )
-                    for column in ("uS1_m", "uS3_m")
-                ),
             ],
-            note=_sag(both),
         ),
         Check(
-            name="paper's case: servomotor force and leg reactions (fig. 12), 20/16 rfes",
+            name="paper's case: servomotor force and leg reactions (fig. 12)",
             bar="≤ 1 % of peak-to-peak",
             measured=f"{forces:.3%} at worst",
             passed=forces <= 0.01,
             rows=both.rows(REACTIONS),
         ),
     ]
+
+
+def shocks() -> list[Check]:
+    """Check a load at rest in space below a deck that moves, and a load that is let go at once."""
+    scenario = Scenario.paper(initial="rest")
+    started = Comparison(
+        here=dynamic_columns(simulate(DynamicCase(scenario=scenario), model=model(FINE.leg, FINE.beam))),
+        there=time_series("shock"),
+    )
+    columns = ("xL1_m", "xL3_m", "T_rope_N", "uS1_m", "uS3_m", "S_R_N", "RAR1_N", "RAR2_N", "RAR3_N")
+    stepped = Comparison(here=environment_columns(scenario), there=started.there)
+    in_env = tuple(stepped.here)
+    released = Comparison(
+        here=columns_of(release(Crane(), CASES["V"], step=1e-4, model=model(FINE.leg, FINE.beam))),
+        there=time_series("release_instant"),
+    )
+    worst, of_env, of_release = (
+        max(both.error(column) for column in names)
+        for both, names in ((started, columns), (stepped, in_env), (released, ("uS1_m", "uS3_m")))
+    )
+    return [
+        Check(
+            name="shock: load at rest in space, deck moving, 60 s, undamped, by default",
+            bar="every column ≤ 1 % of peak-to-peak",
+            measured=f"{worst:.3%} at worst",
+            passed=worst <= 0.01,
+            rows=started.rows(columns),
+        ),
+        Check(
+            name="the same in the environment at its default step",
+            bar="every column ≤ 1 % of peak-to-peak",
+            measured=f"{of_env:.3%} at worst",
+            passed=of_env <= 0.01,
+            rows=stepped.rows(in_env),
+        ),
+        Check(
+            name="release of 100 t at once, 2 s, undamped, by default",
+            bar="deflection of S ≤ 1 % of peak-to-peak",
+            measured=f"{of_release:.3%} at worst",
+            passed=of_release <= 0.01,
+            rows=released.rows(("uS1_m", "uS3_m")),
+            note="Reactions and servomotors are not compared: a step of the force runs through an undamped frame as a "
+            "front, and no number of elements has their histories converge (16 % from 120 to 240 elements a leg).",
+        ),
+    ]
+
+
+def environment_columns(scenario: Scenario) -> dict[str, Array]:
+    """Run 60 s in the environment's engine of the full model as it is by default; columns of the reference data."""
+    engine = FlexibleEngine(1, 0.05, Mesh(FRAME_DIVISION, FRAME_MODES))
+    engine.reset_row(0, scenario)
+    loads, tensions, frames = [], [], []
+    for _ in range(1201):
+        loads.append(engine.read_many(at.LOAD_POSITION, 3)[0])
+        tensions.append(engine.read(at.TENSION)[0])
+        frames.append(engine.read_frames()[0])
+        engine.step(np.zeros(1))
+    load, frame = np.array(loads), np.array(frames)
+    feet = {f"RAR{axis + 1}_N": frame[:, FEET + axis] for axis in range(3)}
+    return {
+        "xL1_m": load[:, 0],
+        "xL3_m": load[:, 2],
+        "T_rope_N": np.array(tensions),
+        "uS1_m": frame[:, 0],
+        "uS3_m": frame[:, 2],
+        "S_R_N": frame[:, SERVOMOTORS],
+        **feet,
+    }
 
 
 def stiff_frame() -> Check:
@@ -172,8 +219,8 @@ def stiff_frame() -> Check:
     )
 
 
-def energy() -> Check:
-    """Check the deck's work against the energy stored and dissipated."""
+def energy() -> list[Check]:
+    """Check the work of deck and drum against the energy stored and dissipated."""
     case = DynamicCase(step=2.5e-3, output_interval=2.5e-3)
     still = energy_balance(simulate(case)).error
     frame = Crane().frame
@@ -182,13 +229,25 @@ def energy() -> Check:
     scenario = Scenario.paper(initial="rest", rope_damping=5e4, crane=Crane(frame=damped))
     lost = energy_balance(simulate(replace(case, scenario=scenario)))
     worst = max(still, lost.error)
-    return Check(
-        name="energy balance over 60 s, step 2.5 ms",
-        bar="1e-5 relative",
-        measured=f"undamped {still:.1e}; frame and rope damped {lost.error:.1e} "
-        f"({lost.dissipated[-1] / 1e3:.0f} kJ lost)",
-        passed=worst <= 1e-5,
+    rough = Scenario.paper(motion=rough_sea(), rope_damping=2e4)
+    sea = energy_balance(
+        simulate(replace(case, scenario=rough, duration=30.0, step=1.25e-3, output_interval=1.25e-3), model=model(5, 2))
     )
+    return [
+        Check(
+            name="energy balance over 60 s, step 2.5 ms",
+            bar="1e-5 relative",
+            measured=f"undamped {still:.1e}; frame and rope damped {lost.error:.1e} "
+            f"({lost.dissipated[-1] / 1e3:.0f} kJ lost)",
+            passed=worst <= 1e-5,
+        ),
+        Check(
+            name="energy balance in a rough sea, all six directions, 30 s, 5/2 rfes, step 1.25 ms",
+            bar="1e-5 relative",
+            measured=f"{sea.error:.1e} of {np.max(np.abs(sea.input)) / 1e6:.1f} MJ put in",
+            passed=sea.error <= 1e-5,
+        ),
+    ]
 
 
 def steps() -> Check:

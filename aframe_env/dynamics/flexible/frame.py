@@ -1,7 +1,8 @@
-"""The frame's modes over one inner step: Newmark's scheme, implicit in the rope's force at its end.
+"""The frame's modes over one inner step: exact but for the forces, which are interpolated between its ends.
 
-η(h) = η + h η̇ + (1/2 - β) h² η̈ + β h² η̈(h), η̇(h) = η̇ + (h/2)(η̈ + η̈(h)), with η̈ + ΦᵀLΦ η̇ + ω² η = F at the end. F is
-linear in the rope's force at S, so that a step is a first pass without it, the rope's equation in three dimensions
+What the deck does goes along a straight line, the rope's elastic pull along a cubic by its values and rates at both
+ends, so that the frame rings at its own frequencies and the rope feels it do so. The end of a step is linear in the
+rope's force there: a step is a first pass without it, the rope's equation in three dimensions
 (``step_rope_and_load``), and a second pass.
 
 Constants, and the slots of a mode as an array of their own, are taken before each loop over lanes: only so can the
@@ -38,10 +39,16 @@ def carry(frame: Array, table: Array, carried: int, lanes: int) -> None:
     h = table[flex.STEP]
     for b in range(carried):
         mode = mode_of(frame, b, lanes)
+        c = flex.HEAD + flex.MODE_SIZE * b
+        square, damping = table[c + flex.SQUARE], table[c + flex.DAMPING]
+        s1, s2, s3 = three(table, c + flex.SHAPE, 1, 0)
         products = slots_of(frame, flex.CARRIED + 9 * b, 9, lanes)
         for j in range(lanes):
-            velocity, acceleration = mode[flex.RATE * lanes + j], mode[flex.ACCELERATION * lanes + j]
-            place = mode[flex.POSITION * lanes + j] + h * (velocity + 0.5 * h * acceleration)
+            place, velocity = mode[flex.POSITION * lanes + j], mode[flex.RATE * lanes + j]
+            f1, f2, f3 = three(frame, flex.PULL, lanes, j)
+            force = mode[flex.FORCE * lanes + j] + (s1 * f1 + s2 * f2 + s3 * f3)
+            acceleration = force - square * place - damping * velocity
+            place += h * (velocity + 0.5 * h * acceleration)
             write_carried(frame, products, place, velocity + h * acceleration, lanes, j)
 
 
@@ -97,15 +104,13 @@ def load_mode(frame: Array, mode: Array, table: Array, i: int, modes: int, carri
 
 
 @scalar
-def newmark_predict(frame: Array, table: Array, lanes: int) -> None:
+def predict_modes(frame: Array, table: Array, lanes: int) -> None:
     """Take the modes to the step's end without the rope's force there, and write TIP: the first pass.
 
-    POSITION and RATE become the end's share that is known already, ACCELERATION that without the rope's force. Lanes
-    that are not ACTIVE stay as they are.
+    Lanes that are not ACTIVE stay as they are.
     """
-    modes, carried, h = int(table[flex.COUNT]), int(table[flex.CARRIED_COUNT]), table[flex.STEP]
+    modes, carried = int(table[flex.COUNT]), int(table[flex.CARRIED_COUNT])
     coupled = table[flex.COUPLED] > 0.0
-    half, twice = 0.5 * h, 2.0 / h
     carry(frame, table, carried, lanes)
     for k in range(6):
         for j in range(lanes):
@@ -114,62 +119,84 @@ def newmark_predict(frame: Array, table: Array, lanes: int) -> None:
         c = flex.HEAD + flex.MODE_SIZE * i
         mode = mode_of(frame, i, lanes)
         load_mode(frame, mode, table, i, modes, carried, lanes)
-        square, damping, inverse = table[c + flex.SQUARE], table[c + flex.DAMPING], table[c + flex.INVERSE]
-        early, late = table[c + flex.EARLY], table[c + flex.LATE]
-        softened = twice * (1.0 + late * square)
-        for j in range(lanes):
-            active = frame[flex.ACTIVE * lanes + j] > 0.0
-            place, rate = mode[flex.POSITION * lanes + j], mode[flex.RATE * lanes + j]
-            before = mode[flex.ACCELERATION * lanes + j]
-            new_place = place + h * rate + early * before
-            new_rate = rate + half * before
-            force = mode[flex.RIGHT * lanes + j] - square * new_place
-            mode[flex.RIGHT * lanes + j] = force + softened * new_rate
-            acceleration = (force - damping * new_rate) * inverse
-            mode[flex.POSITION * lanes + j] = new_place if active else place
-            mode[flex.RATE * lanes + j] = new_rate if active else rate
-            mode[flex.ACCELERATION * lanes + j] = acceleration if active else before
         if not coupled:
-            add_to_tip(frame, mode, three(table, c + flex.SHAPE, 1, 0), late, half, lanes)
+            step_mode(frame, mode, table, c, lanes)
+            add_to_tip(frame, mode, three(table, c + flex.SHAPE, 1, 0), lanes)
     if coupled:
-        solve_coupled(frame, table, modes, carried, lanes)
+        step_coupled_modes(frame, table, modes, carried, lanes)
 
 
 @scalar
-def solve_coupled(frame: Array, table: Array, modes: int, carried: int, lanes: int) -> None:
-    """Write ACCELERATION and TIP where the damping couples the modes: the step's matrix A is inverted beforehand.
+def step_mode(frame: Array, mode: Array, table: Array, c: int, lanes: int) -> None:
+    """Take a mode by itself to the step's end; its constants begin at ``c`` in the table."""
+    free0, free1 = table[c + flex.FREE], table[c + flex.FREE + 1]
+    free2, free3 = table[c + flex.FREE + 2], table[c + flex.FREE + 3]
+    linear0, linear1 = table[c + flex.LINEAR], table[c + flex.LINEAR + 1]
+    linear2, linear3 = table[c + flex.LINEAR + 2], table[c + flex.LINEAR + 3]
+    cubic0, cubic1 = table[c + flex.CUBIC], table[c + flex.CUBIC + 1]
+    cubic2, cubic3 = table[c + flex.CUBIC + 2], table[c + flex.CUBIC + 3]
+    s1, s2, s3 = three(table, c + flex.SHAPE, 1, 0)
+    for j in range(lanes):
+        active = frame[flex.ACTIVE * lanes + j] > 0.0
+        place, rate = mode[flex.POSITION * lanes + j], mode[flex.RATE * lanes + j]
+        before, after = mode[flex.FORCE * lanes + j], mode[flex.RIGHT * lanes + j]
+        f1, f2, f3 = three(frame, flex.PULL, lanes, j)
+        e1, e2, e3 = three(frame, flex.ELASTIC, lanes, j)
+        g1, g2, g3 = three(frame, flex.GROWTH, lanes, j)
+        elastic, growth = s1 * e1 + s2 * e2 + s3 * e3, s1 * g1 + s2 * g2 + s3 * g3
+        start = before + (s1 * f1 + s2 * f2 + s3 * f3) - elastic
+        new_place = (free0 * place + free1 * rate) + (linear0 * start + linear1 * after)
+        new_rate = (free2 * place + free3 * rate) + (linear2 * start + linear3 * after)
+        new_place += cubic0 * elastic + cubic1 * growth
+        new_rate += cubic2 * elastic + cubic3 * growth
+        mode[flex.POSITION * lanes + j] = new_place if active else place
+        mode[flex.RATE * lanes + j] = new_rate if active else rate
+        mode[flex.FORCE * lanes + j] = after if active else before
 
-    With h L / 2 = A - 1 - β h² ω² the damping force of the known rate needs no product of its own.
-    """
-    h = table[flex.STEP]
-    twice = 2.0 / h
-    inverse = flex.HEAD + flex.MODE_SIZE * modes + 9 * carried * carried
+
+@scalar
+def step_coupled_modes(frame: Array, table: Array, modes: int, carried: int, lanes: int) -> None:
+    """Take modes that the damping couples to the step's end, and write TIP."""
+    first = flex.HEAD + flex.MODE_SIZE * modes + 9 * carried * carried
     for i in range(modes):
-        c = flex.HEAD + flex.MODE_SIZE * i
+        mode = mode_of(frame, i, lanes)
+        for row in range(2):
+            for j in range(lanes):
+                mode[(flex.NEXT + row) * lanes + j] = 0.0
+            for k in range(modes):
+                m = first + modes * modes * flex.MATRICES * row + modes * i + k
+                free0, free1 = table[m], table[m + modes * modes]
+                linear0, linear1 = table[m + 2 * modes * modes], table[m + 3 * modes * modes]
+                cubic0, cubic1 = table[m + 4 * modes * modes], table[m + 5 * modes * modes]
+                s1, s2, s3 = three(table, flex.HEAD + flex.MODE_SIZE * k + flex.SHAPE, 1, 0)
+                other = mode_of(frame, k, lanes)
+                for j in range(lanes):
+                    f1, f2, f3 = three(frame, flex.PULL, lanes, j)
+                    e1, e2, e3 = three(frame, flex.ELASTIC, lanes, j)
+                    g1, g2, g3 = three(frame, flex.GROWTH, lanes, j)
+                    elastic, growth = s1 * e1 + s2 * e2 + s3 * e3, s1 * g1 + s2 * g2 + s3 * g3
+                    start = other[flex.FORCE * lanes + j] + (s1 * f1 + s2 * f2 + s3 * f3) - elastic
+                    moved = free0 * other[flex.POSITION * lanes + j] + free1 * other[flex.RATE * lanes + j]
+                    forced = linear0 * start + linear1 * other[flex.RIGHT * lanes + j]
+                    mode[(flex.NEXT + row) * lanes + j] += moved + forced + cubic0 * elastic + cubic1 * growth
+    for i in range(modes):
         mode = mode_of(frame, i, lanes)
         for j in range(lanes):
             active = frame[flex.ACTIVE * lanes + j] > 0.0
-            before, start = mode[flex.ACCELERATION * lanes + j], -twice * mode[flex.RATE * lanes + j]
-            mode[flex.ACCELERATION * lanes + j] = start if active else before
-        for k in range(modes):
-            factor = table[inverse + modes * i + k]
-            other = mode_of(frame, k, lanes)
-            for j in range(lanes):
-                share = factor * other[flex.RIGHT * lanes + j]
-                mode[flex.ACCELERATION * lanes + j] += share * frame[flex.ACTIVE * lanes + j]
-        add_to_tip(frame, mode, three(table, c + flex.SHAPE, 1, 0), table[c + flex.LATE], 0.5 * h, lanes)
+            place, rate = mode[flex.POSITION * lanes + j], mode[flex.RATE * lanes + j]
+            before, after = mode[flex.FORCE * lanes + j], mode[flex.RIGHT * lanes + j]
+            mode[flex.POSITION * lanes + j] = mode[flex.NEXT * lanes + j] if active else place
+            mode[flex.RATE * lanes + j] = mode[(flex.NEXT + 1) * lanes + j] if active else rate
+            mode[flex.FORCE * lanes + j] = after if active else before
+        add_to_tip(frame, mode, three(table, flex.HEAD + flex.MODE_SIZE * i + flex.SHAPE, 1, 0), lanes)
 
 
 @scalar
-def add_to_tip(
-    frame: Array, mode: Array, shape: tuple[float, float, float], late: float, half: float, lanes: int
-) -> None:
+def add_to_tip(frame: Array, mode: Array, shape: tuple[float, float, float], lanes: int) -> None:
     """Add a mode's part to TIP: the motion of S without the rope's force at the step's end."""
     s1, s2, s3 = shape
     for j in range(lanes):
-        acceleration = mode[flex.ACCELERATION * lanes + j]
-        place = mode[flex.POSITION * lanes + j] + late * acceleration
-        rate = mode[flex.RATE * lanes + j] + half * acceleration
+        place, rate = mode[flex.POSITION * lanes + j], mode[flex.RATE * lanes + j]
         frame[flex.TIP * lanes + j] += s1 * place
         frame[(flex.TIP + 1) * lanes + j] += s2 * place
         frame[(flex.TIP + 2) * lanes + j] += s3 * place
@@ -179,20 +206,18 @@ def add_to_tip(
 
 
 @scalar
-def newmark_correct(frame: Array, table: Array, lanes: int) -> None:
-    """Add the rope's force PULL at the step's end and bring the modes there: the second pass."""
-    half = 0.5 * table[flex.STEP]
+def correct_modes(frame: Array, table: Array, lanes: int) -> None:
+    """Add the rope's force at the step's end and bring the modes there: the second pass."""
     for i in range(int(table[flex.COUNT])):
-        c = flex.HEAD + flex.MODE_SIZE * i
+        c = flex.HEAD + flex.MODE_SIZE * i + flex.RESPONSE
         mode = mode_of(frame, i, lanes)
-        r1, r2, r3 = three(table, c + flex.RESPONSE, 1, 0)
-        late = table[c + flex.LATE]
+        place_by, rate_by = nine(table, c, 1, 0), nine(table, c + 9, 1, 0)
         for j in range(lanes):
             active = frame[flex.ACTIVE * lanes + j] > 0.0
             place, rate = mode[flex.POSITION * lanes + j], mode[flex.RATE * lanes + j]
-            free = mode[flex.ACCELERATION * lanes + j]
             f1, f2, f3 = three(frame, flex.PULL, lanes, j)
-            acceleration = free + (r1 * f1 + r2 * f2 + r3 * f3)
-            mode[flex.POSITION * lanes + j] = place + late * acceleration if active else place
-            mode[flex.RATE * lanes + j] = rate + half * acceleration if active else rate
-            mode[flex.ACCELERATION * lanes + j] = acceleration if active else free
+            e1, e2, e3 = three(frame, flex.ELASTIC, lanes, j)
+            g1, g2, g3 = three(frame, flex.GROWTH, lanes, j)
+            parts = (e1, e2, e3, g1, g2, g3, f1 - e1, f2 - e2, f3 - e3)
+            mode[flex.POSITION * lanes + j] = place + dot(place_by, parts) if active else place
+            mode[flex.RATE * lanes + j] = rate + dot(rate_by, parts) if active else rate

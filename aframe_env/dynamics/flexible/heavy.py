@@ -4,10 +4,10 @@ Over an inner step the head's path is a cubic through where it was and where the
 it ``dynamics.heavy_rope`` makes one Runge-Kutta step. The tension that comes out, eased by what the head gives way to
 it, is the next pass's force: two passes, as what is left falls to a few hundredths with each.
 
-On the head pull the rope to the drum and that to the load, with one tension, and what the lumps, held on the line,
-hand on to it across the line: weight, drag, inertia by the lever rule. The head's own vibration has no part in that
-inertia: a rope, unlike a rod, would not follow it sideways. The Coriolis force on the lumps, some 1e-4 of the tension,
-acts on the load alone.
+The head answers the force as one that goes along a straight line. On it pull the rope to the drum and that to the
+load, with one tension, and what the lumps, held on the line, hand on to it across the line: weight, drag, inertia by
+the lever rule. The head's own vibration has no part in that inertia: a rope, unlike a rod, would not follow it
+sideways. The Coriolis force on the lumps, some 1e-4 of the tension, acts on the load alone.
 
 Rope that goes over S as the head comes nearer to the drum is written to ENDS as if the drum had paid it out; the row
 has the distance from drum to pulley at rest. The end of a step in ENDS is where the next one starts.
@@ -170,8 +170,8 @@ def head_force(row: Array, frame: Array, table: Array, shift: Vector, force: Vec
     slide = row[(at.STAGE + SLIDE) * lanes + j]
     a, pulls = directions(row, frame, shift, 1.0, lanes, j), directions(row, frame, shift, slide, lanes, j)
     stiffness, loss_time = row[(at.STAGE + TOP_STIFFNESS) * lanes + j], row[(at.STAGE + TOP_LOSS) * lanes + j]
-    eased = apply_transposed(nine(table, flex.COMPLIANCE, 1, 0), a)
-    eased = along(eased, loss_time, apply_transposed(nine(table, flex.COMPLIANCE_RATE, 1, 0), a))
+    eased = apply_transposed(nine(table, flex.GIVE + 18, 1, 0), a)
+    eased = along(eased, loss_time, apply_transposed(nine(table, flex.GIVE_RATE + 18, 1, 0), a))
     eased = scaled(stiffness, eased)
     across = apply_transposed(nine(frame, flex.ROTATION, lanes, j), handed_up(row, lanes, j))
     beyond, pull = tension_beyond(row, lanes, j), row[(at.STAGE + BELOW) * lanes + j]
@@ -189,7 +189,7 @@ def step_heavy_rope(row: Array, frame: Array, table: Array, index: int, span: Sp
     h, lanes, j = table[flex.STEP], span.stride, span.begin
     springs = int(row[at.SPRINGS * lanes + j])
     tip, tip_rate = three(frame, flex.TIP, lanes, j), three(frame, flex.TIP + 3, lanes, j)
-    give, give_rate = nine(table, flex.COMPLIANCE, 1, 0), nine(table, flex.COMPLIANCE_RATE, 1, 0)
+    give, give_rate = nine(table, flex.GIVE + 18, 1, 0), nine(table, flex.GIVE_RATE + 18, 1, 0)
     for k in range(at.END_SIZE):
         row[(START + k) * lanes + j] = row[(END + k) * lanes + j]
     for k in range(at.LIFT_SIZE):
@@ -254,7 +254,7 @@ def start_heavy_rows(row: Array, frame: Array, tables: Array, comoving: float, l
         deflection = rest_heavy(row, frame, table, lanes, j)
         hang(row, frame, deflection, comoving, lanes, j)
         measure(row, frame, deflection, Span(lanes, j, j + 1))
-        release(row, frame, table, lanes, j)
+        release(frame, table, lanes, j)
 
 
 @scalar

@@ -2,7 +2,7 @@
 
 Rows are stored as in ``aframe_env.dynamics.layout``, in an array of their own: (blocks, slots(modes) * lanes). The
 constants of a frame are one line of a table, (frames, size): the head, then MODE_SIZE numbers for each mode, then the
-carried matrix, then, where the damping couples the modes, the inverse of the step's matrix. All float64, SI.
+carried matrix, then, where the damping couples the modes, the matrices of the step. All float64, SI.
 """
 
 from __future__ import annotations
@@ -20,19 +20,23 @@ LOAD_ACCELERATION: Final = 4
 """Acceleration of the load in the base frame, 3."""
 PULL: Final = 7
 """Rope's force on the frame at S, along {D}, 3."""
+ELASTIC: Final = 10
+"""Its elastic part, which goes along a cubic from step to step; the rest goes along straight lines; 3."""
+GROWTH: Final = 13
+"""Rate of the elastic part, 3."""
 
 # Scratch.
-COORDINATES: Final = 10
+COORDINATES: Final = 16
 """Quintics of the deck's six coordinates over the segment, 36 coefficients (coordinate-major)."""
-ROTATION: Final = 46
+ROTATION: Final = 52
 """{D} → base frame, 9, row-major."""
-ORIGIN: Final = 55
+ORIGIN: Final = 61
 """Origin of {D} in the base frame: position and velocity, 6."""
-SPIN: Final = 61
+SPIN: Final = 67
 """Angular velocity of {D}, along {D}, 3."""
-INPUT: Final = 64
+INPUT: Final = 70
 """Deck's motion as the frame feels it: field (gravity less acceleration, 3) and W = α× + Ω×Ω× (9), in {D}."""
-CARRIED: Final = 76
+CARRIED: Final = 82
 """W_cd η_b + 2 Ω×_cd η̇_b of the carried modes b: 9 for each of at most CARRIED_MOST."""
 CARRIED_MOST: Final = 8
 TIP: Final = CARRIED + 9 * CARRIED_MOST
@@ -45,10 +49,13 @@ MODES: Final = HELD + LIFT_SIZE
 """MODE_SLOTS for each mode from here on."""
 POSITION: Final = 0
 RATE: Final = 1
-ACCELERATION: Final = 2
+FORCE: Final = 2
+"""What the deck's motion does to the mode, N/√kg."""
 RIGHT: Final = 3
-"""Right-hand side of a coupled step (scratch)."""
-MODE_SLOTS: Final = 4
+"""The same at the end of the step (scratch)."""
+NEXT: Final = 4
+"""Place and rate at the end of a coupled step (scratch), 2."""
+MODE_SLOTS: Final = 6
 
 # The table of a frame: its head.
 COUNT: Final = 0
@@ -58,31 +65,35 @@ COUPLED: Final = 2
 """1 where the damping couples the modes."""
 STEP: Final = 3
 """h, s."""
-COMPLIANCE: Final = 4
-"""Displacement of S at the step's end for a unit force there at that time, 9, m/N."""
-COMPLIANCE_RATE: Final = 13
-"""Its rate, 9, m/(s N)."""
-REST: Final = 22
+GIVE: Final = 4
+"""Displacement of S at the step's end by the rope's force there: by its elastic part [m/N], by the rate of that [m s/N]
+and by the rest [m/N]; 9 each."""
+GIVE_RATE: Final = 31
+"""Rate of S in the same way, 9 each."""
+REST: Final = 58
 """Displacement of S at rest for a unit force there, 9, m/N."""
-HEAD: Final = 31
+HEAD: Final = 67
 # Of each mode.
 SQUARE: Final = 0
 """ω², 1/s²."""
 DAMPING: Final = 1
-"""ΦᵀLΦ, 1/s; 0 where the modes are coupled."""
-LATE: Final = 2
-"""β h², s²."""
-EARLY: Final = 3
-"""(1/2 - β) h², s²."""
-INVERSE: Final = 4
-"""1 / (1 + h ΦᵀLΦ / 2 + β h² ω²); unused where the modes are coupled."""
-SHAPE: Final = 5
+"""ΦᵀLΦ, 1/s."""
+FREE: Final = 2
+"""Place at the step's end by place and rate at its start, rate by the same, 4."""
+LINEAR: Final = 6
+"""Place by a force at the start and at the end of the step that goes along a straight line, rate by the same, 4."""
+CUBIC: Final = 10
+"""Place by a force at the start and by its rate there, which goes along a cubic, rate by the same, 4."""
+SHAPE: Final = 14
 """Displacement of S, 3."""
-RESPONSE: Final = 8
-"""Acceleration at the step's end for a unit force at S at that time, 3."""
-FIELD: Final = 11
+RESPONSE: Final = 17
+"""Place by the rope's force at the step's end (elastic part, its rate, the rest; 3 each), rate by the same, 18."""
+FIELD: Final = 35
 """Force for a unit INPUT, 12 (inertial terms with their minus)."""
-MODE_SIZE: Final = 23
+MODE_SIZE: Final = 47
+# Matrices of a coupled step: place, then rate, by the modes' places, rates, forces at the start and at the end, and by
+# the rope's elastic force at the start and its rate.
+MATRICES: Final = 6
 
 
 def slots(modes: int) -> int:

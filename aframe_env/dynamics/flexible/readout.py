@@ -62,7 +62,8 @@ def read_frame(frame: Array, table: Array, stresses: Array, result: Array, lanes
     acting = HEAD + 2 * FORCES * modes
     strains = acting + FORCES * (12 + 9 * carried + 3)
     shares = strains + 12 * springs * modes
-    reach = shares + 6 * springs * points
+    fields = shares + 6 * springs * points
+    reach = fields + 18 * springs
     for i in range(modes):
         mode = (flex.MODES + flex.MODE_SLOTS * i) * lanes + j
         place, rate = frame[mode + flex.POSITION * lanes], frame[mode + flex.RATE * lanes]
@@ -85,6 +86,7 @@ def read_frame(frame: Array, table: Array, stresses: Array, result: Array, lanes
         add_line(forces, table, acting + FORCES * k, FORCES, frame[(flex.INPUT + k) * lanes + j])
     for k in range(3):
         add_line(forces, table, acting + FORCES * (12 + 9 * carried + k), FORCES, frame[(flex.PULL + k) * lanes + j])
+        add_line(stresses, table, fields + 6 * springs * k, 6 * springs, frame[(flex.INPUT + k) * lanes + j])
     worst = 0.0
     for spring in range(springs):
         n, v2, v3 = abs(stresses[6 * spring]), abs(stresses[6 * spring + 1]), abs(stresses[6 * spring + 2])

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from aframe_env.dynamics.compiling import scalar
+from aframe_env.dynamics.compiling import scalar, select
 from aframe_env.dynamics.load import tension
-from aframe_env.dynamics.vector import Vector, add, cross, difference, inner, scaled
+from aframe_env.dynamics.vector import Vector, add, along, cross, difference, inner, scaled
 
 Matrix = tuple[float, float, float, float, float, float, float, float, float]
 """3 × 3, row-major."""
@@ -35,14 +35,22 @@ class Unloaded(NamedTuple):
 
 
 class Compliance(NamedTuple):
-    """Displacements and rates that a unit force at the step's end adds there."""
+    """Displacements and rates at the step's end by the rope's force there: elastic part, its rate, the rest."""
 
-    pulley: Matrix
+    by_elastic: Matrix
     """Displacement of S, m/N."""
-    pulley_rate: Matrix
+    by_growth: Matrix
+    """m s/N."""
+    by_rest: Matrix
+    """m/N."""
+    rate_by_elastic: Matrix
+    """Rate of S, m/(s N)."""
+    rate_by_growth: Matrix
+    """m/N."""
+    rate_by_rest: Matrix
     """m/(s N)."""
     load: float
-    """Displacement of the load, m/N."""
+    """Displacement of the load by the force as a whole, m/N."""
     load_rate: float
     """m/(s N)."""
 
@@ -65,6 +73,10 @@ class Pull(NamedTuple):
 
     tension: float
     """N."""
+    elastic: float
+    """Its elastic part, N."""
+    growth: float
+    """Rate of that part, N/s; of its length alone, not of its directions."""
     to_load: Vector
     """Unit vector from S to the load."""
     to_drum: Vector
@@ -97,11 +109,21 @@ def unit(v: Vector) -> tuple[float, Vector]:
 @scalar
 def iterate_tension(pull: Pull, unloaded: Unloaded, compliance: Compliance, rope: PaidOut) -> Pull:
     """Tension and directions of the rope, better than those of ``pull``."""
-    force = pull.tension
+    force, elastic, growth = pull.tension, pull.elastic, pull.growth
+    rest = force - elastic
     a = add(pull.to_load, pull.to_drum)
-    g, r = apply(compliance.pulley, a), apply(compliance.pulley_rate, a)
-    s = add(unloaded.pulley, scaled(force, g))
-    u = add(unloaded.pulley_rate, scaled(force, r))
+    g_elastic, g_growth, g_rest = (
+        apply(compliance.by_elastic, a),
+        apply(compliance.by_growth, a),
+        apply(compliance.by_rest, a),
+    )
+    r_elastic, r_growth, r_rest = (
+        apply(compliance.rate_by_elastic, a),
+        apply(compliance.rate_by_growth, a),
+        apply(compliance.rate_by_rest, a),
+    )
+    s = along(along(along(unloaded.pulley, elastic, g_elastic), growth, g_growth), rest, g_rest)
+    u = along(along(along(unloaded.pulley_rate, elastic, r_elastic), growth, r_growth), rest, r_rest)
     x = difference(unloaded.load, scaled(force * compliance.load, pull.to_load))
     v = difference(unloaded.load_rate, scaled(force * compliance.load_rate, pull.to_load))
     hanging, to_load = unit(difference(x, s))
@@ -110,10 +132,22 @@ def iterate_tension(pull: Pull, unloaded: Unloaded, compliance: Compliance, rope
     w = difference(difference(v, cross(unloaded.spin, x)), u)
     rate = inner(to_load, w) - inner(to_drum, u)
     stretch = hanging + inboard - rope.length
-    give = compliance.load + a.x * g.x + a.y * g.y + a.z * g.z
-    give_rate = compliance.load_rate + a.x * r.x + a.y * r.y + a.z * r.z
-    # As if the rope had given way by what this force explains: the tension then solves the law.
-    stiffness = rope.axial_stiffness / rope.length
-    softened = 1.0 + stiffness * give + rope.damping * give_rate
-    elongation, elongation_rate = stretch + give * force, rate - rope.speed + give_rate * force
-    return Pull(tension(elongation, elongation_rate, stiffness, rope.damping) / softened, to_load, to_drum)
+    # As if the rope had given way by what this force explains: length and rate then solve the law, two by two.
+    give = compliance.load + inner(a, g_elastic), inner(a, g_growth), compliance.load + inner(a, g_rest)
+    slow = compliance.load_rate + inner(a, r_elastic), inner(a, r_growth), compliance.load_rate + inner(a, r_rest)
+    stretch += give[0] * elastic + give[1] * growth + give[2] * rest
+    rate += slow[0] * elastic + slow[1] * growth + slow[2] * rest - rope.speed
+    stiffness, damping = rope.axial_stiffness / rope.length, rope.damping
+    m11, m12 = 1.0 + stiffness * give[0], stiffness * give[1] + damping * give[2]
+    m21, m22 = stiffness * slow[0], 1.0 + stiffness * slow[1] + damping * slow[2]
+    scale = 1.0 / (m11 * m22 - m12 * m21)
+    elongation, elongation_rate = (m22 * stretch - m12 * rate) * scale, (m11 * rate - m21 * stretch) * scale
+    pulled = tension(elongation, elongation_rate, stiffness, damping)
+    taut = pulled > 0.0
+    return Pull(
+        pulled,
+        select(taut, stiffness * elongation, 0.0),
+        select(taut, stiffness * elongation_rate, 0.0),
+        to_load,
+        to_drum,
+    )

@@ -44,7 +44,7 @@ def start_rows(row: Array, frame: Array, tables: Array, comoving: float, lanes: 
         deflection = rest(row, frame, table, row[at.GRAVITY * lanes + j] * row[at.MASS * lanes + j], lanes, j)
         place_load(row, frame, deflection, comoving, lanes, j)
         pull_head(row, frame, deflection, lanes, j)
-        release(row, frame, table, lanes, j)
+        release(frame, table, lanes, j)
 
 
 @scalar
@@ -110,7 +110,7 @@ def pull_head(row: Array, frame: Array, deflection: Vector, lanes: int, j: int) 
     mass, gravity = row[at.MASS * lanes + j], row[at.GRAVITY * lanes + j]
     still = Vector(0.0, 0.0, 0.0)
     pull = iterate_tension(
-        Pull(0.0, still, still),
+        Pull(0.0, 0.0, 0.0, still, still),
         Unloaded(
             pulley,
             still,
@@ -119,7 +119,7 @@ def pull_head(row: Array, frame: Array, deflection: Vector, lanes: int, j: int) 
             three(frame, flex.DRUM, lanes, j),
             three(frame, flex.SPIN, lanes, j),
         ),
-        Compliance(NOTHING, NOTHING, 0.0, 0.0),
+        Compliance(NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, NOTHING, 0.0, 0.0),
         PaidOut(
             row[at.FREE_LENGTH * lanes + j],
             0.0,
@@ -132,29 +132,28 @@ def pull_head(row: Array, frame: Array, deflection: Vector, lanes: int, j: int) 
     frame[(flex.LOAD_ACCELERATION + 1) * lanes + j] = -force / mass * n.y
     frame[(flex.LOAD_ACCELERATION + 2) * lanes + j] = -force / mass * n.z - gravity
     for k in range(3):
-        frame[(flex.PULL + k) * lanes + j] = force * (pull.to_load[k] + pull.to_drum[k])
+        towards = pull.to_load[k] + pull.to_drum[k]
+        frame[(flex.PULL + k) * lanes + j] = force * towards
+        frame[(flex.ELASTIC + k) * lanes + j] = pull.elastic * towards
+        frame[(flex.GROWTH + k) * lanes + j] = pull.growth * towards
     row[at.TENSION * lanes + j] = force
     row[at.PEAK_TENSION * lanes + j] = force
     row[at.SLACK * lanes + j] = 1.0 if force <= 0.0 else 0.0
 
 
 @scalar
-def release(row: Array, frame: Array, table: Array, lanes: int, j: int) -> None:
-    """Find the accelerations of the modes at the start, PULL being known."""
+def release(frame: Array, table: Array, lanes: int, j: int) -> None:
+    """Find what the deck does to the modes at the start."""
     modes, carried = int(table[flex.COUNT]), int(table[flex.CARRIED_COUNT])
     for b in range(carried):
         place = frame[(flex.MODES + flex.MODE_SLOTS * b + flex.POSITION) * lanes + j]
         write_carried(frame, slots_of(frame, flex.CARRIED + 9 * b, 9, lanes), place, 0.0, lanes, j)
     for i in range(modes):
         c = flex.HEAD + flex.MODE_SIZE * i
-        mode = flex.MODES + flex.MODE_SLOTS * i
         uniform, turning = three(table, c + flex.FIELD, 1, 0), nine(table, c + flex.FIELD + 3, 1, 0)
         total = deck_force(frame, uniform, turning, lanes, j)
-        for k in range(3):
-            total += table[c + flex.SHAPE + k] * frame[(flex.PULL + k) * lanes + j]
         if i < carried:
             matrix = flex.HEAD + flex.MODE_SIZE * modes + 9 * carried * i
             for k in range(9 * carried):
                 total += table[matrix + k] * frame[(flex.CARRIED + k) * lanes + j]
-        total -= table[c + flex.SQUARE] * frame[(mode + flex.POSITION) * lanes + j]
-        frame[(mode + flex.ACCELERATION) * lanes + j] = total
+        frame[(flex.MODES + flex.MODE_SLOTS * i + flex.FORCE) * lanes + j] = total

@@ -15,7 +15,7 @@ from aframe_env.dynamics.blocks import nine, three
 from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar
 from aframe_env.dynamics.flexible import layout as flex
 from aframe_env.dynamics.flexible.deck import advance_deck, deck_at
-from aframe_env.dynamics.flexible.frame import newmark_correct, newmark_predict
+from aframe_env.dynamics.flexible.frame import correct_modes, predict_modes
 from aframe_env.dynamics.flexible.heavy import start_heavy_rows, step_heavy_rope
 from aframe_env.dynamics.flexible.rope import (
     Compliance,
@@ -45,7 +45,16 @@ LOAD_BETA: Final = 1.0 / 12.0
 def step_rope_and_load(row: Array, frame: Array, table: Array, index: int, span: Span) -> None:
     """Bring drum and load to the end of inner step ``index``, and find the rope's force there."""
     h, lanes = table[flex.STEP], span.stride
-    tip, tip_rate = nine(table, flex.COMPLIANCE, 1, 0), nine(table, flex.COMPLIANCE_RATE, 1, 0)
+    give0, give1, give2 = (
+        nine(table, flex.GIVE, 1, 0),
+        nine(table, flex.GIVE + 9, 1, 0),
+        nine(table, flex.GIVE + 18, 1, 0),
+    )
+    rate0, rate1, rate2 = (
+        nine(table, flex.GIVE_RATE, 1, 0),
+        nine(table, flex.GIVE_RATE + 9, 1, 0),
+        nine(table, flex.GIVE_RATE + 18, 1, 0),
+    )
     late, half = LOAD_BETA * h * h, 0.5 * h
     early = (0.5 - LOAD_BETA) * h * h
     for j in range(span.begin, span.end):
@@ -78,9 +87,10 @@ def step_rope_and_load(row: Array, frame: Array, table: Array, index: int, span:
         )
         _, to_load = unit(difference(unloaded.load, pulley))
         _, to_drum = unit(difference(unloaded.drum, pulley))
-        compliance = Compliance(tip, tip_rate, late / mass, half / mass)
+        compliance = Compliance(give0, give1, give2, rate0, rate1, rate2, late / mass, half / mass)
         rope = PaidOut(length, radius * speed, stiffness, damping)
-        pull = Pull(row[at.TENSION * lanes + j], to_load, to_drum)
+        tension = row[at.TENSION * lanes + j]
+        pull = Pull(tension, tension, 0.0, to_load, to_drum)
         pull = iterate_tension(pull, unloaded, compliance, rope)
         pull = iterate_tension(pull, unloaded, compliance, rope)
         pull = iterate_tension(pull, unloaded, compliance, rope)
@@ -98,8 +108,10 @@ def step_rope_and_load(row: Array, frame: Array, table: Array, index: int, span:
         frame[(flex.LOAD_ACCELERATION + 1) * lanes + j] = n.y if active else b.y
         frame[(flex.LOAD_ACCELERATION + 2) * lanes + j] = n.z - gravity if active else b.z
         for k in range(3):
-            before = frame[(flex.PULL + k) * lanes + j]
-            frame[(flex.PULL + k) * lanes + j] = force * (pull.to_load[k] + pull.to_drum[k]) if active else before
+            towards = pull.to_load[k] + pull.to_drum[k]
+            for slot, part in ((flex.PULL, force), (flex.ELASTIC, pull.elastic), (flex.GROWTH, pull.growth)):
+                before = frame[(slot + k) * lanes + j]
+                frame[(slot + k) * lanes + j] = part * towards if active else before
         row[at.DRUM_ANGLE * lanes + j] = angle if active else row[at.DRUM_ANGLE * lanes + j]
         row[at.DRUM_SPEED * lanes + j] = speed if active else row[at.DRUM_SPEED * lanes + j]
         row[(at.WINCH + 4) * lanes + j] = error if active else error0
@@ -181,9 +193,9 @@ def _step_of(
                 deck_at(row, frame, index, lanes)
                 for line in range(tables.shape[0]):
                     if mark_active(row, frame, line, index, lanes):
-                        newmark_predict(frame, tables[line], lanes)
+                        predict_modes(frame, tables[line], lanes)
                         step_rope(row, frame, tables[line], index, Span(lanes, 0, lanes))
-                        newmark_correct(frame, tables[line], lanes)
+                        correct_modes(frame, tables[line], lanes)
         for j in range(lanes):
             row[at.OMEGA1 * lanes + j] += row[at.STEP_COST * lanes + j]
 

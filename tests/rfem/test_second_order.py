@@ -1,0 +1,57 @@
+"""Second order of the frame, against a multibody program with geometrically exact beams."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aframe_env.rfem.statics import LoadCase, static
+from aframe_env.scenario.crane import Crane
+from aframe_env.scenario.cross_sections import Servomotor
+from aframe_env.validation import InvalidValue
+from train.verify.frame_checks import model
+
+SIDE = (0.0, 1e5, 0.0)
+# exudyn 1.13.6: 40 beams a member, shear deformable, the statics of benchmarks/exudyn_peer.py with dead forces at S, or
+# with a connector of constant force from S to the drum in place of the rope. u_S [mm], servomotors R and L [N].
+EXACT = {
+    ("L1", False): ((12.6307, 0.0, -22.5165), 667275.2, 667275.2),
+    ("L1", True): ((12.5081, 0.0, -22.4547), 663018.1, 663018.1),
+    ("L1 and a side force", False): ((12.6467, 37.5376, -22.6005), 669442.9, 665151.6),
+    ("L1 and a side force", True): ((12.5230, 36.4299, -22.5336), 665101.4, 660958.6),
+}
+
+
+@pytest.mark.parametrize(("name", "follows"), list(EXACT))
+@pytest.mark.parametrize("division", [(20, 16), (40, 40)])
+def test_deflection_and_servomotors_are_those_of_exact_beams(name, follows, division):
+    forces = {"S": SIDE} if "side" in name else {}
+    case = LoadCase(rope_tension=981e3, forces=forces, second_order=True, rope_follows=follows)
+    frame = model(*division)
+    result = static(Crane(), case, model=frame)
+    displacement, right, left = EXACT[name, follows]
+    linear = static(Crane(), replace(case, second_order=False, rope_follows=False), model=frame)
+    found, target = result.displacement["S"] * 1e3, np.array(displacement)
+    assert found == pytest.approx(target, abs=1e-3 * np.abs(target).max())
+    assert [*result.servomotor_tension.values()] == pytest.approx([right, left], rel=1e-3)
+    gap = np.abs(linear.displacement["S"] * 1e3 - target).max()
+    assert gap > 5.0 * np.abs(found - target).max()
+
+
+def test_elastic_servomotors_as_stiff_as_rigid_ones():
+    crane = Crane()
+    elastic = replace(crane.frame.structure, servomotor=Servomotor(stiffness=1e14))
+    stiff = Crane(frame=replace(crane.frame, structure=elastic))
+    case = LoadCase(rope_tension=981e3, forces={"S": SIDE}, second_order=True)
+    both = [static(each, case).displacement["S"] for each in (crane, stiff)]
+    assert both[0] == pytest.approx(both[1], abs=2e-4 * np.abs(both[0]).max())
+
+
+def test_a_frame_beyond_its_buckling_load_is_named():
+    with pytest.raises(InvalidValue, match="the frame buckles"):
+        static(Crane(), LoadCase(forces={"S": (0.0, 1e3, -2e9)}, second_order=True), model=model(10, 8))
+
+
+def test_rope_follows_with_second_order_only():
+    with pytest.raises(InvalidValue, match="rope_follows = True: only with second_order"):
+        LoadCase(rope_follows=True)
