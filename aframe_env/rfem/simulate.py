@@ -23,7 +23,7 @@ from aframe_env.rfem.model import FrameModel, frame_model
 from aframe_env.rfem.reduction import ModalFrame, of_motion, resolved_form
 from aframe_env.rfem.rope_law import RopeForce, rope_force
 from aframe_env.rfem.servomotor_stroke import Stroke, strokes_at
-from aframe_env.rfem.statics import solve
+from aframe_env.rfem.statics import LoadCase, solve, static
 from aframe_env.rfem.structure import cross_matrix
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_number
@@ -76,6 +76,9 @@ class DynamicCase:
     """Prescribed change of the lengths of rigid servomotors S_R and S_L; None: none."""
     duration: float = 60.0
     """s."""
+    second_order: bool = False
+    """Whether the frame has the geometric stiffness (P–Δ) of its state at rest, see
+    :mod:`aframe_env.rfem.second_order`; that of the rope is there in any case."""
     step: float = 2.5e-3
     """Of frame, load and drum, s; made a little smaller so that a whole number of them makes an output interval."""
     output_interval: float = 0.05
@@ -377,6 +380,9 @@ def simulate(case: DynamicCase | None = None, *, model: FrameModel | None = None
     frame = model or frame_model(what.scenario.crane.frame)
     if frame.frame != what.scenario.crane.frame:
         raise InvalidValue("model: must have been made of the frame of the scenario's crane")
+    if what.second_order:
+        hanging = LoadCase(rope_tension=what.scenario.weight, second_order=True)
+        frame = static(what.scenario.crane, hanging, model=frame).model
     run = _Run(what, frame)
     run.start()
     count = run.outputs + 1

@@ -78,6 +78,7 @@ class StaticResult:
     """The frame under a static load case. Vectors are along {D}."""
 
     model: FrameModel
+    """With the geometric stiffness of the state where that is of second order."""
     case: LoadCase
     position: Array
     """q, (n,)."""
@@ -323,7 +324,7 @@ def static(crane: Crane, case: LoadCase, *, model: FrameModel | None = None) -> 
 
     names = ("A_R", "A_L", *LOADED_POINTS)
     return StaticResult(
-        model=frame,
+        model=state.model,
         case=case,
         position=position,
         reactions={"A_R": feet[0], "A_L": feet[1]},

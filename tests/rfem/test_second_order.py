@@ -5,9 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aframe_env.rfem.modes import frame_modes
+from aframe_env.rfem.simulate import DynamicCase, simulate
 from aframe_env.rfem.statics import LoadCase, static
+from aframe_env.scenario import Scenario
 from aframe_env.scenario.crane import Crane
 from aframe_env.scenario.cross_sections import Servomotor
+from aframe_env.scenario.motion import HarmonicMotion
 from aframe_env.validation import InvalidValue
 from train.verify.frame_checks import model
 
@@ -36,6 +40,18 @@ def test_deflection_and_servomotors_are_those_of_exact_beams(name, follows, divi
     assert [*result.servomotor_tension.values()] == pytest.approx([right, left], rel=1e-3)
     gap = np.abs(linear.displacement["S"] * 1e3 - target).max()
     assert gap > 5.0 * np.abs(found - target).max()
+
+
+def test_a_loaded_frame_swings_slower_and_starts_from_the_same_place():
+    scenario = Scenario.paper(motion=HarmonicMotion(), initial="rest")
+    linear, second = (
+        simulate(DynamicCase(scenario=scenario, second_order=flag, duration=1.0), model=model(10, 8))
+        for flag in (False, True)
+    )
+    assert second.frame.displacement("S")[0] == pytest.approx(linear.frame.displacement("S")[0], rel=0.03)
+    found, expected = (frame_modes(Crane(), 3, model=each.frame.model).frequency for each in (second, linear))
+    assert (found < expected).all()
+    assert found == pytest.approx(expected, rel=0.05)
 
 
 def test_elastic_servomotors_as_stiff_as_rigid_ones():

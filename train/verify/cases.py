@@ -57,6 +57,7 @@ its own weight stays; undamped:
   duration = 60.0              s
   output_interval = 0.05       s
   step = 0.0025                s
+  second_order = false         true: the frame with the geometric stiffness (P-Delta) of its state at rest
                                and the keys of a scenario file, among them
   load_mass = 100000.0         kg
   target_level = -300.0        m, h: the load's height at rest with the frame rigid
@@ -83,6 +84,7 @@ FINE = Division(leg=120, beam=100)
 
 _MODEL = {"rfes", "layout", "corrected_shear"}
 _RUN = {"duration", "output_interval", "step"}
+_DYNAMIC = _RUN | {"second_order"}
 _CRANE = {"servomotors", "servomotor_stiffness", "servomotor_damping", "frame"}
 _STATIC = {"own_weight", "rope_tension", "forces"}
 _SECOND_ORDER = {"second_order", "rope_follows"}
@@ -222,9 +224,10 @@ def dynamic_case(data: Mapping[str, Any], folder: Path = Path()) -> dict[str, ob
         folder: Folder of the files that it names.
     """
     keys = {item.name for item in fields(Scenario)}
-    _only(data, _MODEL | _RUN | keys)
+    _only(data, _MODEL | _DYNAMIC | keys)
     scenario = scenario_of({name: value for name, value in data.items() if name in keys}, folder, "scenario")
-    case = DynamicCase(scenario=scenario, **{name: data[name] for name in _RUN if name in data})
+    _flag(data, "second_order", False)
+    case = DynamicCase(scenario=scenario, **{name: data[name] for name in _DYNAMIC if name in data})
     result = simulate(case, model=model_of(data, scenario.crane))
     return {name: column.tolist() for name, column in dynamic_columns(result).items()}
 
