@@ -19,6 +19,13 @@ def static_cases() -> dict[str, dict[str, Any]]:
     return cases
 
 
+def second_order_cases() -> list[dict[str, Any]]:
+    """Static cases of a multibody program with geometrically exact beams: L1, with a side force [N] at S or without,
+    the rope to the drum following S or not; u_S along {D} [m] and both servomotors' tension [N]."""
+    cases: list[dict[str, Any]] = json.loads((_DATA / "second_order.json").read_text())["cases"]
+    return cases
+
+
 def natural_frequencies() -> Array:
     """First ten natural frequencies of the frame, Hz, of that program (elements of 0.05 m); (10,)."""
     return np.array(json.loads((_DATA / "modal.json").read_text())["A_lumped_rotary"])

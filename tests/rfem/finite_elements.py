@@ -4,6 +4,8 @@ Twelve coordinates an element (displacement and rotation of both ends along {F})
 rest (Friedman and Kosmatka, 1993), feet on pins, servomotors rigid; undamped, in all its modes.
 """
 
+import itertools
+
 import numpy as np
 from scipy.linalg import eigh, null_space
 
@@ -66,9 +68,7 @@ class Frame:
         places, parts = [], []
         for member, count in zip(members, (leg, beam, leg), strict=True):
             ends = [member.start + (member.end - member.start) * k / count for k in range(count + 1)]
-            parts += [
-                (self._node(places, a), self._node(places, b), member) for a, b in zip(ends, ends[1:], strict=False)
-            ]
+            parts += [(self._node(places, a), self._node(places, b), member) for a, b in itertools.pairwise(ends)]
         size = 6 * len(places)
         self.stiffness, self.mass = np.zeros((2, size, size))
         for first, last, member in parts:

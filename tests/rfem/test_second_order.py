@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from aframe_env.rfem.modes import frame_modes
+from aframe_env.rfem.reference import second_order_cases
 from aframe_env.rfem.simulate import DynamicCase, simulate
 from aframe_env.rfem.statics import LoadCase, static
 from aframe_env.scenario import Scenario
@@ -16,30 +17,21 @@ from aframe_env.validation import InvalidValue
 from train.verify.frame_checks import model
 
 SIDE = (0.0, 1e5, 0.0)
-# exudyn 1.13.6: 40 beams a member, shear deformable, the statics of benchmarks/exudyn_peer.py with dead forces at S, or
-# with a connector of constant force from S to the drum in place of the rope. u_S [mm], servomotors R and L [N].
-EXACT = {
-    ("L1", False): ((12.6307, 0.0, -22.5165), 667275.2, 667275.2),
-    ("L1", True): ((12.5081, 0.0, -22.4547), 663018.1, 663018.1),
-    ("L1 and a side force", False): ((12.6467, 37.5376, -22.6005), 669442.9, 665151.6),
-    ("L1 and a side force", True): ((12.5230, 36.4299, -22.5336), 665101.4, 660958.6),
-}
 
 
-@pytest.mark.parametrize(("name", "follows"), list(EXACT))
+@pytest.mark.parametrize("target", second_order_cases(), ids=lambda case: case["name"])
 @pytest.mark.parametrize("division", [(20, 16), (40, 40)])
-def test_deflection_and_servomotors_are_those_of_exact_beams(name, follows, division):
-    forces = {"S": SIDE} if "side" in name else {}
-    case = LoadCase(rope_tension=981e3, forces=forces, second_order=True, rope_follows=follows)
+def test_deflection_and_servomotors_are_those_of_exact_beams(target, division):
+    forces = {"S": (0.0, target["side_force"], 0.0)}
+    case = LoadCase(rope_tension=981e3, forces=forces, second_order=True, rope_follows=target["rope_follows"])
     frame = model(*division)
     result = static(Crane(), case, model=frame)
-    displacement, right, left = EXACT[name, follows]
     linear = static(Crane(), replace(case, second_order=False, rope_follows=False), model=frame)
-    found, target = result.displacement["S"] * 1e3, np.array(displacement)
-    assert found == pytest.approx(target, abs=1e-3 * np.abs(target).max())
-    assert [*result.servomotor_tension.values()] == pytest.approx([right, left], rel=1e-3)
-    gap = np.abs(linear.displacement["S"] * 1e3 - target).max()
-    assert gap > 5.0 * np.abs(found - target).max()
+    expected = np.array(target["u_S_D"])
+    assert result.displacement["S"] == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())
+    assert [*result.servomotor_tension.values()] == pytest.approx(target["servomotors"], rel=1e-3)
+    gap, left = (np.abs(each.displacement["S"] - expected).max() for each in (linear, result))
+    assert gap > 5.0 * left
 
 
 def test_a_loaded_frame_swings_slower_and_starts_from_the_same_place():

@@ -72,6 +72,7 @@ CHECKS: Sequence[Callable[[], Check | list[Check]]] = (
     frame_checks.beam_frequencies,
     frame_checks.determinate_reactions,
     frame_checks.static_frame,
+    frame_checks.second_order,
     frame_checks.natural_modes,
     frame_checks.previous_model,
     run_checks.releases,

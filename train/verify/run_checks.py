@@ -60,9 +60,10 @@ class Comparison:
 
 
 @cache
-def ramp_release(leg: int = 120, beam: int = 100) -> Comparison:
+def ramp_release(leg: int = 120, beam: int = 100, corrected_shear: bool = False) -> Comparison:
     """Simulate a release of 100 t over 0.1 s, 2 s, undamped."""
-    history = release(Crane(), CASES["V"], ramp=0.1, step=1e-4, model=model(leg, beam))
+    frame = model(leg, beam, corrected_shear=corrected_shear)
+    history = release(Crane(), CASES["V"], ramp=0.1, step=1e-4, model=frame)
     return Comparison(here=columns_of(history), there=time_series("release_ramp"))
 
 
@@ -78,22 +79,24 @@ def releases() -> Check:
     fine = ramp_release()
     worst = max(fine.error(column) for column in columns)
     rows = fine.rows(columns)
-    for division in ((20, 16), (40, 32), (60, 50)):
-        errors = [ramp_release(*division).error(column) for column in columns]
+    for leg, beam, corrected in ((20, 16, False), (40, 32, False), (60, 50, False), (120, 100, True)):
+        errors = [ramp_release(leg, beam, corrected).error(column) for column in columns]
         rows.append(
             Row(
-                quantity=f"worst of these at {division[0]}/{division[1]}",
+                quantity=f"worst of these at {leg}/{beam}" + ", corrected elements" * corrected,
                 measured="",
                 reference="",
                 error=f"{max(errors):.3%}",
             )
         )
     return Check(
-        name="release of 100 t over 0.1 s, 2 s, undamped, at 120/100 rfes (the reference's 0.1 m)",
+        name="release of 100 t over 0.1 s, 2 s, undamped, the paper's elements, 120/100 (the reference's 0.1 m)",
         bar="deflection of S and reactions ≤ 1 % of peak-to-peak",
         measured=f"{worst:.3%} at worst",
         passed=worst <= 0.01,
         rows=rows,
+        note="The reference lumps its mass as the paper's elements do. Corrected elements differ from it by what both "
+        "differ from a continuous beam.",
     )
 
 
