@@ -19,7 +19,7 @@ from aframe_env.scenario.crane import Crane
 from train.shared.run_folder import write_atomically
 from train.verify.cases import dynamic_columns
 from train.verify.frame_checks import CASES, model
-from train.verify.run_checks import paper_run, ramp_release
+from train.verify.run_checks import paper_run, ramp_release, shock_run
 
 HERE, REFERENCE = "#1f77b4", "#d62728"
 
@@ -184,7 +184,7 @@ def release_histories() -> Figure:
     return _histories(run.here["t_s"], run.here, run.there, panels, names)
 
 
-_FLEXIBLE = ("rfem 20/16", "independent program")
+_FLEXIBLE = ("rfem 120/100", "independent program")
 
 
 def figure_11() -> Figure:
@@ -199,6 +199,14 @@ def figure_12() -> Figure:
     return _histories(here["t_s"], here, there, [SERVOMOTOR, *REACTIONS], _FLEXIBLE)
 
 
+def shock_histories() -> Figure:
+    """Draw the first six seconds of a load that starts at rest in space below a deck that moves."""
+    run = shock_run()
+    first = slice(0, 121)
+    here, there = ({name: column[first] for name, column in each.items()} for each in (run.here, run.there))
+    return _histories(here["t_s"], here, there, [OUTBOARD, UPWARDS, SERVOMOTOR, *REACTIONS], _FLEXIBLE)
+
+
 def figure_14() -> Figure:
     """Draw x_L3 in the full and the simplified model, and their difference."""
     here, there, rigid = (
@@ -210,7 +218,7 @@ def figure_14() -> Figure:
     top, bottom = figure.subplots(2, 1, sharex=True)
     time = here["t_s"]
     top.plot(time, rigid["xL3_m"], color="0.5", linewidth=2.2, label="simplified model (reference run)")
-    top.plot(time, here["xL3_m"], color=HERE, linewidth=1.0, label="full model, rfem 20/16")
+    top.plot(time, here["xL3_m"], color=HERE, linewidth=1.0, label="full model, rfem 120/100")
     top.set_ylabel("$x_{L3}$, m")
     top.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     bottom.plot(
@@ -221,7 +229,7 @@ def figure_14() -> Figure:
         alpha=0.6,
         label="independent program",
     )
-    bottom.plot(time, (here["xL3_m"] - rigid["xL3_m"]) * 1e3, color=HERE, linewidth=0.9, label="rfem 20/16")
+    bottom.plot(time, (here["xL3_m"] - rigid["xL3_m"]) * 1e3, color=HERE, linewidth=0.9, label="rfem 120/100")
     bottom.set_ylabel("full − simplified, mm")
     bottom.set_xlabel("t, s")
     bottom.legend(fontsize=8, loc="upper left")
@@ -237,6 +245,7 @@ def draw_all(folder: Path) -> list[Path]:
             ("moment_diagrams", moment_diagrams),
             ("mode_shapes", mode_shapes),
             ("release_ramp", release_histories),
+            ("shock", shock_histories),
             ("figure_11_deflection", figure_11),
             ("figure_12_forces", figure_12),
             ("figure_14_load", figure_14),
