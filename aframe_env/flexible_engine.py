@@ -14,7 +14,7 @@ from aframe_env.dynamics.flexible.readout import READOUTS, readout_kernel
 from aframe_env.dynamics.flexible.step import flexible_kernels
 from aframe_env.dynamics.start import inner_steps, longest_inner_step
 from aframe_env.engine import Engine, FloatArray, Timing
-from aframe_env.rfem.reduction import STATIC_SHAPES
+from aframe_env.rfem.reduction import STATIC_SHAPES, modal_frame
 from aframe_env.rfem.structure import Division
 from aframe_env.rfem.tables import readout_table, step_table
 from aframe_env.scenario import Scenario
@@ -22,8 +22,11 @@ from aframe_env.scenario.crane import Frame
 from aframe_env.scenario.motion import Components
 from aframe_env.validation import InvalidValue, require_integer, shown
 
-FLEXIBLE_STEP: Final = 0.005
-"""Longest inner step, s: with it what a sudden start does to the frame is within 1 % (reactions, deflections)."""
+FLEXIBLE_STEPS: Final = (0.005, 0.0125)
+"""Longest inner step, s, with many modes and with few."""
+MODE_PHASE: Final = 3.8
+"""Most that the highest natural mode turns in one between these two, rad. What a sudden start does to the frame is then
+within 1 % (reactions, deflections) with the default number of modes, and as good as with any step with fewer."""
 FRAME_DIVISION: Final = Division(leg=60, beam=50)
 """Default division of the frame."""
 FRAME_MODES: Final = 16
@@ -170,11 +173,16 @@ class FlexibleEngine(Engine):
 
     def _timing(self, scenario: Scenario) -> Timing:
         segment = self.control_period / self._segments
-        longest = self._max_inner_step or FLEXIBLE_STEP
+        longest = self._max_inner_step or self._frame_step(scenario.crane.frame)
         # Halved rather than fitted, so that a distribution of ropes needs few tables.
         while longest > longest_rope_step(scenario):
             longest *= 0.5
         return Timing(self._segments, segment, inner_steps(segment, longest))
+
+    def _frame_step(self, frame: Frame) -> float:
+        """Longest inner step that a frame's modes allow, s."""
+        modal = modal_frame(frame, self.mesh.division, self.mesh.modes)
+        return float(np.clip(MODE_PHASE / np.sqrt(modal.square[modal.natural - 1]), *FLEXIBLE_STEPS))
 
     def _line(self, scenario: Scenario) -> int:
         """Line of a scenario's frame in the tables, which it is added to when new."""

@@ -93,7 +93,6 @@ def step_rope_and_load(row: Array, frame: Array, table: Array, index: int, span:
         pull = Pull(tension, tension, 0.0, to_load, to_drum)
         pull = iterate_tension(pull, unloaded, compliance, rope)
         pull = iterate_tension(pull, unloaded, compliance, rope)
-        pull = iterate_tension(pull, unloaded, compliance, rope)
 
         force = pull.tension
         n = scaled(-force / mass, apply(turned, pull.to_load))
