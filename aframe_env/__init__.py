@@ -1,7 +1,7 @@
 """Active heave compensation of a load under an offshore A-frame crane, as a Gymnasium environment.
 
-Importing this package registers ``AFrameHeave-v0``. What it exports is listed in ``__init__.pyi`` and loaded when it is
-first used, so that the import itself is quick.
+Importing this package registers ``AFrameHeave-v0`` and the tasks of the suite, ``AFrameHeave-Storm-v0`` and so on. What
+it exports is listed in ``__init__.pyi`` and loaded when it is first used, so that the import itself is quick.
 """
 
 from __future__ import annotations
@@ -16,13 +16,18 @@ from aframe_env.neighbours import in_the_way, overwritten
 __version__ = "0.1.0"
 ENV_ID = "AFrameHeave-v0"
 
-if ENV_ID not in gymnasium.registry:
-    # The environment truncates by itself, after `episode_duration`; a TimeLimit wrapper would cut a longer one short.
-    gymnasium.register(
-        id=ENV_ID,
-        entry_point="aframe_env.env:AFrameHeaveEnv",
-        vector_entry_point="aframe_env.vector_env:AFrameHeaveVectorEnv",
-    )
+_SUITE = {f"AFrameHeave-{name}-v0": {"task": name} for name in ("Storm", "Unknown")}
+"""Ids of the tasks in ``aframe_env.suite``, which an import has no time to ask."""
+
+for _id, _arguments in {ENV_ID: {}, **_SUITE}.items():
+    if _id not in gymnasium.registry:
+        # The environment truncates by itself, after `episode_duration`; a TimeLimit wrapper would cut a longer one.
+        gymnasium.register(
+            id=_id,
+            entry_point="aframe_env.env:AFrameHeaveEnv",
+            vector_entry_point="aframe_env.vector_env:AFrameHeaveVectorEnv",
+            kwargs=_arguments,
+        )
 
 # A folder of the user's may well be called so, and this package does without it. One that is damaged is worth a word.
 if overwritten("agents"):

@@ -13,6 +13,7 @@ from .scenario.target import TargetPath
 from .scenario.told import Told
 from .scenario.vessel import Vessel
 from .scenario.water import LoadShape, Seabed, Water
+from .suite import TASKS, Task, find_task
 from .validation import (
     InvalidValue,
     RecordNoiseWarning,
@@ -27,6 +28,7 @@ __version__: str
 __all__ = [
     "ENV_ID",
     "LOADS",
+    "TASKS",
     "Channel",
     "Compensator",
     "Crane",
@@ -51,11 +53,13 @@ __all__ = [
     "Sensors",
     "SmallRotationWarning",
     "TargetPath",
+    "Task",
     "TaskConfig",
     "Told",
     "Vessel",
     "Water",
     "Winch",
+    "find_task",
     "read_scenario",
     "read_scenarios",
     "scenario_text",

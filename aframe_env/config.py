@@ -16,6 +16,7 @@ from aframe_env.flexible_engine import Mesh, mesh_of
 from aframe_env.scenario import Scenario, ScenarioDistribution, ScenarioSource, Sensors
 from aframe_env.scenario.file import scenario_data, scenario_source
 from aframe_env.serialization import plain, strict_converter, structure
+from aframe_env.suite import find_task
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_known, require_number
 
 Model = Literal["simplified", "rfem"]
@@ -95,6 +96,12 @@ class TaskConfig:
         """Quantities of the observation."""
         return task.STATE if self.sensors is None else task.SENSED
 
+    @property
+    def given(self) -> dict[str, Any]:
+        """Arguments that are not the defaults."""
+        own = [each for each in fields(self) if each.init and getattr(self, each.name) != each.default]
+        return {each.name: getattr(self, each.name) for each in own}
+
     def lasting(self, steps: int | None) -> TaskConfig:
         """Return the same task with episodes of so many control steps; None: as long as they are."""
         if steps is None or steps == self.steps:
@@ -107,8 +114,7 @@ class TaskConfig:
 
         Raises ``InvalidValue`` where the scenario has a vessel or a record that was not read from a file.
         """
-        own = [each for each in fields(self) if each.init and getattr(self, each.name) != each.default]
-        found = {each.name: getattr(self, each.name) for each in own}
+        found = self.given
         if "scenario" in found:
             found["scenario"] = scenario_data(self.source)
         if isinstance(self.observation, Sensors):
@@ -121,10 +127,15 @@ class TaskConfig:
 
 
 def task_config(config: TaskConfig | Mapping[str, Any] | None, arguments: Mapping[str, Any]) -> TaskConfig:
-    """Return the task of a ``config``, or the default one, but for these fields."""
-    if isinstance(config, TaskConfig):
+    """Return the task of a ``config``, or the default one, but for these fields.
+
+    ``task`` among them names a task of the suite: it stands for what neither says.
+    """
+    if isinstance(config, TaskConfig) and "task" not in arguments:
         return config.replaced(**arguments)
-    return TaskConfig(**_known({**(config or {}), **arguments}))
+    given = {**(config.given if isinstance(config, TaskConfig) else config or {}), **arguments}
+    name = given.pop("task", None)
+    return TaskConfig(**_known({**({} if name is None else find_task(name).arguments), **given}))
 
 
 def plain_spec(spec: EnvSpec | None, config: TaskConfig) -> EnvSpec | None:
@@ -134,7 +145,7 @@ def plain_spec(spec: EnvSpec | None, config: TaskConfig) -> EnvSpec | None:
     """
     if spec is None:
         return None
-    names = {"config", *(each.name for each in fields(TaskConfig))}
+    names = {"config", "task", *(each.name for each in fields(TaskConfig))}
     others = {name: value for name, value in spec.kwargs.items() if name not in names}
     others = {name: value.value if isinstance(value, Enum) else value for name, value in others.items()}
     try:

@@ -116,6 +116,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     ## Arguments
     By keyword, as in `gymnasium.make("AFrameHeave-v0", control_period=0.2)`, or together as `config=TaskConfig(...)`:
 
+    - `task`: name of a task of the suite, as in `task="Storm"`, which is what `gymnasium.make("AFrameHeave-Storm-v0")`
+      says: its scenarios, observation, control period and duration stand for what is not given.
     - `model`: "simplified" or "rfem".
     - `rfes`: with "rfem", elements of a leg and of the top beam (default `(60, 50)`; the beam's even).
     - `rfem_modes`: with "rfem", how many natural modes to keep beside the static shapes; default 16, enough for a load

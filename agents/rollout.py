@@ -14,21 +14,12 @@ from aframe_env.config import TaskConfig, task_config
 from aframe_env.dynamics import layout as at
 from aframe_env.memory import require_memory
 from aframe_env.scenario import Scenario, ScenarioSource
+from aframe_env.scenario.series import drawn_scenarios as drawn_scenarios
 from aframe_env.simulation import Simulation
 from agents.policy import FloatArray, Policy, begin
 
 HELD_OUT_SEED = 20_091_123
 """Scenarios for evaluation are drawn from this seed and their number. Training never draws from it."""
-
-
-def drawn_scenarios(source: ScenarioSource, seed: int, count: int) -> list[Scenario]:
-    """Return the first ``count`` scenarios of a series; the same ones, whatever the count.
-
-    A single scenario is its own series.
-    """
-    if isinstance(source, Scenario):
-        return [source] * count
-    return [source.draw(np.random.default_rng([seed, i])) for i in range(count)]
 
 
 def held_out_scenarios(source: ScenarioSource, count: int) -> list[Scenario]:

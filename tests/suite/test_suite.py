@@ -1,0 +1,172 @@
+"""Tasks of the suite: what Gymnasium makes of them, that their scenarios stay as they are, and who is told what."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+
+from aframe_env import TASKS, InvalidValue, ScenarioDistribution, TaskConfig, find_task
+from aframe_env.suite import SPLITS
+from aframe_env.task import SENSED
+from agents.control.optimum import saturating
+from agents.policy import Knowledge
+from agents.rollout import HELD_OUT_SEED, run
+
+IDS = [task.id for task in TASKS.values()]
+STORM, UNKNOWN = TASKS["Storm"], TASKS["Unknown"]
+
+
+def test_every_task_is_registered_and_nothing_else():
+    registered = {name for name in gymnasium.registry if name.startswith("AFrameHeave-")}
+    assert registered == {"AFrameHeave-v0", *IDS}
+    assert [find_task(text) for text in ("Storm", "storm", STORM.id)] == [STORM] * 3
+
+
+@pytest.mark.parametrize("env_id", IDS)
+@pytest.mark.parametrize("observation", ["state", "sensors"])
+@pytest.mark.filterwarnings("ignore:.*symmetric and normalized.*")  # actions are rad/s by design
+def test_gymnasium_has_nothing_to_say(env_id, observation):
+    check_env(gymnasium.make(env_id, observation=observation).unwrapped, skip_render_check=True)
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_a_row_of_many_is_the_scalar_environment(env_id):
+    rows = gymnasium.make_vec(env_id, num_envs=3, vectorization_mode="vector_entry_point")
+    alone = gymnasium.make(env_id)
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-2.0, 2.0, (50, 3, 1)).astype(np.float32)
+    together = [rows.reset(seed=7)[0], *(rows.step(action)[0] for action in actions)]
+    for row in range(3):
+        one = [alone.reset(seed=7 + row)[0], *(alone.step(action[row])[0] for action in actions)]
+        assert np.array_equal(np.array(together)[:, row], np.array(one))
+
+
+@pytest.mark.parametrize("task", TASKS.values(), ids=list(TASKS))
+def test_an_environment_is_the_task_but_for_what_the_user_says(task):
+    def config(env_id: str = task.id, **arguments: Any) -> TaskConfig:
+        return gymnasium.make(env_id, **arguments).unwrapped.simulation.config  # type: ignore[attr-defined]
+
+    assert config() == TaskConfig(**task.arguments) == config("AFrameHeave-v0", task=task.name)
+    assert config().source == task.distribution
+    assert config(control_period=0.2) == TaskConfig(**{**task.arguments, "control_period": 0.2})
+    assert config(config={"control_period": 0.2}) == config(config=TaskConfig(control_period=0.2))
+    assert config(config=TaskConfig(control_period=0.2)) == config(control_period=0.2)
+    calm = ScenarioDistribution(hs=1.0)
+    assert config(scenario=calm).source == config(config=TaskConfig(scenario=calm)).source == calm
+    assert config(scenario=calm).observation == "sensors"
+    assert config(observation="state").observation == "state"
+    assert config(max_episode_steps=20).steps == 20
+
+
+@pytest.mark.parametrize("env_id", IDS)
+def test_a_spec_makes_the_same_task_again(env_id):
+    env = gymnasium.make(env_id, observation="state", control_period=0.2)
+    text = env.spec.to_json()
+    assert json.loads(text)["id"] == env_id
+    again = gymnasium.make(EnvSpec.from_json(text))
+    assert again.unwrapped.simulation.config.observation == "state"
+    assert np.array_equal(env.reset(seed=3)[0], again.reset(seed=3)[0])
+    assert again.unwrapped.scenario.crane == env.unwrapped.scenario.crane
+
+
+def test_a_task_that_is_none_is_refused():
+    with pytest.raises(InvalidValue, match=r"task = 'Calm': must be one of 'Storm', 'Unknown'"):
+        gymnasium.make("AFrameHeave-v0", task="Calm")
+    with pytest.raises(InvalidValue, match="task = 3"):
+        TaskConfig(**find_task(3).arguments)  # type: ignore[arg-type]
+
+
+def test_splits_are_apart_and_do_not_depend_on_the_count():
+    seeds = [task.seed(split) for task in TASKS.values() for split in SPLITS]
+    assert len({*seeds, HELD_OUT_SEED}) == len(seeds) + 1
+    for task in TASKS.values():
+        assert task.scenarios("test", 3) == task.scenarios("test", 5)[:3]
+
+
+@pytest.mark.parametrize("task", TASKS.values(), ids=list(TASKS))
+def test_the_scenarios_are_those_that_were_frozen(task):
+    assert [task.require_frozen(split) for split in SPLITS] == list(task.digests.values())
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"hs": (3.0, 5.001)},
+        {"components": 33},
+        {"max_rope_acceleration": (1.0, 2.001)},
+        {"told_mass_error": 0.001},
+        {"sensor_delay": 0.1},
+        {"ramp": 10.001},
+    ],
+)
+def test_a_change_of_what_is_drawn_is_noticed(change):
+    other = replace(STORM, distribution=replace(STORM.distribution, **change))
+    with pytest.raises(InvalidValue, match=r"AFrameHeave-Storm-v0: the scenarios of the split 'test' have the digest"):
+        other.require_frozen("test")
+
+
+def test_in_storm_most_winches_saturate_and_all_is_told_truly():
+    scenarios = STORM.scenarios("test", 100)
+    assert 85 <= saturating(scenarios, TaskConfig(**STORM.arguments)).sum() <= 95
+    assert all(scenario.as_told is scenario for scenario in scenarios)
+    for scenario in scenarios:
+        winch = scenario.crane.winch
+        assert 1.5 <= winch.max_rope_speed <= 2.5
+        assert 1.0 <= winch.max_rope_acceleration <= 2.0
+        assert 3.0 <= scenario.motion.sea.hs <= 5.0
+        assert 7.0 <= scenario.motion.sea.tp <= 12.0
+
+
+class Spy:
+    """Looks for the truth wherever a policy is let."""
+
+    name, knows = "spy", Knowledge.SENSORS
+
+    def reset(self, scenarios, control_period):
+        self.handed = list(scenarios)
+        self.masses = []
+
+    def act(self, observation, time):
+        self.masses.append(observation[:, [quantity.name for quantity in SENSED].index("load_mass")])
+        return np.zeros(len(observation))
+
+
+def test_in_unknown_a_policy_comes_by_nothing_but_what_was_told():
+    scenarios, spy = UNKNOWN.scenarios("test", 20), Spy()
+    run(spy, scenarios, TaskConfig(**UNKNOWN.arguments), episode_duration=1.0)
+    for handed, true in zip(spy.handed, scenarios, strict=True):
+        assert (handed.crane.rope.axial_stiffness, handed.crane.winch.lag, handed.sensor_delay) == (2.0e8, 0.15, 0.2)
+        assert handed.told is None
+        assert 0.0 < abs(handed.load_mass / true.load_mass - 1.0) <= 0.2
+    told = np.array([handed.load_mass for handed in spy.handed], dtype=np.float32)
+    assert all(np.array_equal(seen, told) for seen in spy.masses)
+
+
+def test_in_unknown_readings_are_as_late_as_is_and_not_as_told():
+    # Perfect instruments, so that nothing but the delay is between a motion and its reading.
+    perfect = {name: {} for name in ("heave", "heave_rate", "roll", "pitch", "drum_speed", "tension", "depth_error")}
+    rows = gymnasium.make_vec(
+        UNKNOWN.id,
+        num_envs=8,
+        vectorization_mode="vector_entry_point",
+        observation={"delay": 0.2, **perfect},
+        autoreset_mode=AutoresetMode.DISABLED,
+    )
+    seen, true = [rows.reset(seed=1)[0]], [rows.unwrapped.simulation.state.copy()]
+    for _ in range(300):
+        seen.append(rows.step(np.zeros((8, 1), np.float32))[0])
+        true.append(rows.unwrapped.simulation.state.copy())
+    times = 0.1 * np.arange(len(seen))
+    heave, heard = np.array(true)[:, :, 6], np.array(seen)[:, :, 0]
+    for row, scenario in enumerate(rows.unwrapped.scenarios):
+        late = np.interp(times[100:] - scenario.sensor_delay, times, heave[:, row])
+        np.testing.assert_allclose(heard[100:, row], late, atol=1e-5)
+        assert scenario.sensor_delay != pytest.approx(0.2, abs=1e-3)
