@@ -14,12 +14,13 @@ SHIPPED = (
     "agents/*/seed-0/agent.safetensors",
     "drive-map/drive_map.json",
     "drive-map/drive_map.safetensors",
+    "tasks/*/ceiling*.json",
 )
 """What of ``results`` goes into the wheel: see ``agents/shipped.py``."""
 
 
 class BuildWithAgents(build_py):
-    """Put one seed of each agent, and the drive map, into the package from where their commands wrote them."""
+    """Put one seed of each agent, the drive map and the ceilings into the package from where commands wrote them."""
 
     def run(self) -> None:
         """Build the packages; an editable install finds the agents where they are."""

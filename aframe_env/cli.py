@@ -16,6 +16,7 @@ COMMANDS: Final[Mapping[str, str]] = {
     "sac": "train a SAC agent and compare it",
     "gpu-ppo": "train a PPO agent of rsl_rl on a GPU",
     "evaluate": "compare policies on held-out scenarios, and write the report",
+    "benchmark": "score policies on the tasks of the suite",
     "drives": "optimise drum drives for one scenario, as in the paper",
     "drive-map": "build the map of basic drives",
     "optimisers": "compare Gauss-Newton with Nelder-Mead",

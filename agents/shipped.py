@@ -1,4 +1,4 @@
-"""The agents and the drive map that come with the package, by name."""
+"""The agents, the drive map and the tasks' ceilings that come with the package, by name."""
 
 from __future__ import annotations
 
@@ -19,3 +19,8 @@ def folder(place: str | Path) -> Path:
     if place == DRIVE_MAP:
         return _ROOT / DRIVE_MAP
     return AGENTS.get(str(place), Path(place)) if isinstance(place, str) else place
+
+
+def task_folder(name: str) -> Path:
+    """Return the folder of what was computed once for a task of the suite."""
+    return _ROOT / "tasks" / name.lower()

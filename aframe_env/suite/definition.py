@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
 from aframe_env.scenario import Scenario, ScenarioDistribution
@@ -50,6 +50,8 @@ class Task:
     episode_duration: float = 60.0
     """s."""
     seeds: Seeds
+    left_out: Mapping[Split, frozenset[int]] = field(default_factory=dict)
+    """Numbers of a split's draws in which the rope parts whatever the drum does: there is nothing to be scored."""
     digests: Mapping[Split, str]
     """Digest of the first scenarios of each split as they were when the task was frozen."""
 
@@ -75,7 +77,9 @@ class Task:
 
     def scenarios(self, split: Split, count: int) -> list[Scenario]:
         """Return the first ``count`` scenarios of a split; the same ones, whatever the count."""
-        return drawn_scenarios(self.distribution, self.seed(split), count)
+        left_out = self.left_out.get(split, frozenset())
+        drawn = drawn_scenarios(self.distribution, self.seed(split), count + len(left_out))
+        return [scenario for i, scenario in enumerate(drawn) if i not in left_out][:count]
 
     def digest(self, split: Split) -> str:
         """Digest of the split's first scenarios as they are drawn now."""

@@ -50,7 +50,7 @@ class Optimum:
     commands: FloatArray
     """(N, n) rad/s, one for each control step."""
     omega1: FloatArray
-    """(N,) m² s."""
+    """(N,) m² s; infinite where nothing was found that keeps the rope."""
     rounds: npt.NDArray[np.int64]
     """(N,) Gauss-Newton steps that were made."""
 
@@ -158,11 +158,14 @@ class CommandSequence:
 
 
 def _optimise(scenarios: Sequence[Scenario], config: TaskConfig, commands: FloatArray, rounds: int) -> Optimum:
-    best = _simulate(scenarios, config, commands)
-    still = np.sqrt(_simulate(scenarios, config, np.zeros_like(commands)).omega1)
+    best, drum_still = (_simulate(scenarios, config, each) for each in (commands, np.zeros_like(commands)))
+    # Commands that part the rope are nowhere to go on from; where a drum left still parts it, too, nothing is.
+    lost = np.flatnonzero(np.isinf(best.omega1))
+    best.put(lost, drum_still, lost)
+    still = np.sqrt(np.where(np.isinf(drum_still.omega1), best.omega1, drum_still.omega1))
     model = np.stack([_rope_model(scenario, config.control_period) for scenario in scenarios], axis=1)
     made = np.zeros(len(scenarios), dtype=np.int64)
-    idle = np.zeros(len(scenarios), dtype=np.int64)
+    idle = np.where(np.isinf(best.omega1), 2, 0)
     for number in range(rounds):
         active = np.flatnonzero(idle < 2)
         if not len(active):

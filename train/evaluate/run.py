@@ -21,7 +21,7 @@ from aframe_env.validation import InvalidValue, require_integer
 from agents.control.optimum import saturating
 from agents.drives.optimisation import OptimisedDrive
 from agents.drives.tuned import TUNED
-from agents.policy import Knowledge, Policy
+from agents.policy import FloatArray, Knowledge, Policy
 from agents.registry import DRUM_STILL, OPTIMUM, BuildContext, PolicySpec, Spread, as_spec, choose, choose_all, in_turn
 from agents.rollout import Episodes, held_out_scenarios, history_bytes, run
 from train.evaluate.statistics import Entry, Mask, Row, compare, compare_families
@@ -114,9 +114,9 @@ class Comparison:
         return compare_families(self.entries, self.still, *self._yardsticks)
 
     @property
-    def _yardsticks(self) -> tuple[Episodes, Mask] | tuple[()]:
-        """Optimum, and where the winch saturates, if the optimum was among the policies."""
-        return () if self.optimum is None else (self.optimum, self.saturating)
+    def _yardsticks(self) -> tuple[FloatArray, Mask] | tuple[()]:
+        """The optimum's errors, and where the winch saturates, if the optimum was among the policies."""
+        return () if self.optimum is None else (self.optimum.rms, self.saturating)
 
 
 def require_period(specs: Sequence[PolicySpec], control_period: float) -> None:
@@ -145,20 +145,35 @@ class _Ran:
 def run_all(
     specs: Sequence[PolicySpec], held_out: HeldOut, console: Console, *, jobs: Path = IN_MEMORY, where: Where = HERE
 ) -> Comparison:
-    """Run the drum still and every policy that was chosen over the held-out scenarios.
+    """Run the drum still and every policy that was chosen over the held-out scenarios, as ``run_on`` does."""
+    scenarios = held_out_scenarios(held_out.config.source, held_out.number)
+    return run_on(specs, held_out.config, scenarios, console, privileged=held_out.privileged, jobs=jobs, where=where)
 
+
+def run_on(
+    specs: Sequence[PolicySpec],
+    config: TaskConfig,
+    scenarios: Sequence[Scenario],
+    console: Console,
+    *,
+    privileged: int | None = None,
+    seed: int = 0,
+    jobs: Path = IN_MEMORY,
+    where: Where = HERE,
+) -> Comparison:
+    """Run the drum still and every policy that was chosen over these scenarios of the task of ``config``.
+
+    ``privileged``: the first so many of them, or all, for policies that are built for each scenario; ``seed``: of the
+    sensors' noise, by which the scenarios are told from another series in ``jobs``.
     What is finished, each policy's run over a block of scenarios and each drive that one needs, is kept in the file
     ``jobs``, and not computed again. Drives are optimised ``where``; policies run there too where it was asked for,
     and otherwise in this process, which has not to start others for that.
     Worker processes import the calling script: there the call has to stand where an import does not reach it.
     """
-    config = held_out.config
     chosen = (DRUM_STILL, *(c for c in specs if c.name != DRUM_STILL.name))
-    everything = range(held_out.number)
-    count = sum(len(everything[: held_out.privileged] if c.for_each_scenario else everything) for c in chosen)
+    first = scenarios[:privileged]
+    count = sum(len(first if c.for_each_scenario else scenarios) for c in chosen)
     require_memory(f"{count} episodes of {config.steps} control steps", count * history_bytes(config.steps))
-    scenarios = held_out_scenarios(config.source, held_out.number)
-    first = scenarios[: held_out.privileged]
     version = version_of(aframe_env, agents)
     entries = []
     with (
@@ -177,7 +192,7 @@ def run_all(
                 part
                 for spec in chosen
                 if spec.text and not spec.for_each_scenario
-                for part in _parts(spec, config, scenarios)
+                for part in _parts(spec, config, scenarios, seed)
             ]
             run_jobs(
                 _run_elsewhere, elsewhere, _Part.key, store=ran, where=where, progress=progress, description="policies"
@@ -186,7 +201,7 @@ def run_all(
             mine = first if spec.for_each_scenario else scenarios
             if not mine:
                 continue
-            parts = _parts(spec, config, mine)
+            parts = _parts(spec, config, mine, seed)
             bar = progress.add_task(spec.name, total=len(parts) * config.steps)
             found = []
             for part in parts:
@@ -208,23 +223,27 @@ class _Part:
     scenarios: Sequence[Scenario]
     first: int
     """Number of the first scenario."""
+    seed: int
+    """Of the sensors' noise."""
 
     def key(self) -> list[Any]:
         """What identifies the run."""
-        return [self.name, self.digest, self.config, self.first, len(self.scenarios)]
+        return [self.name, self.digest, self.config, self.seed, self.first, len(self.scenarios)]
 
     def run(self, spec: PolicySpec, spread: Spread = in_turn, advance: Callable[[], object] = lambda: None) -> _Ran:
         """Build the policy, and run it; ``advance`` is called after each step."""
         policy = spec.policy(BuildContext(scenarios=self.scenarios, config=self.config, spread=spread))
         seen = self.config.replaced(observation=observation_of(policy, self.config))
-        episodes = run(policy, self.scenarios, seen, first=self.first, progress=lambda _: advance())
+        episodes = run(
+            policy, self.scenarios, seen, noise_seed=self.seed, first=self.first, progress=lambda _: advance()
+        )
         return _Ran(policy.knows, episodes)
 
 
-def _parts(spec: PolicySpec, config: TaskConfig, scenarios: Sequence[Scenario]) -> list[_Part]:
+def _parts(spec: PolicySpec, config: TaskConfig, scenarios: Sequence[Scenario], seed: int) -> list[_Part]:
     """Runs of a policy over all scenarios, a block each."""
     return [
-        _Part(spec.text, spec.name, spec.digest, config, scenarios[first : first + BLOCK], first)
+        _Part(spec.text, spec.name, spec.digest, config, scenarios[first : first + BLOCK], first, seed)
         for first in range(0, len(scenarios), BLOCK)
     ]
 

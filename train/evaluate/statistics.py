@@ -91,6 +91,8 @@ class Row:
     """Mean heave reduction in the worst 5 % of the scenarios."""
     share: Interval | None
     """Mean share of the achievable: heave reduction over the winch-limited optimum's; None without that in the run."""
+    share_median: Interval | None
+    """Median share."""
     share_tail: Interval | None
     """Mean share in the 5 % of the scenarios where it is least."""
     share_saturating: Interval | None
@@ -138,16 +140,19 @@ def reductions(entry: Entry, still: Episodes) -> FloatArray:
 
 
 def compare(
-    entries: Sequence[Entry], still: Episodes, optimum: Episodes | None = None, saturating: Mask | None = None
+    entries: Sequence[Entry], still: Episodes, optimum: FloatArray | None = None, saturating: Mask | None = None
 ) -> list[Row]:
-    """Figures of every policy, agents that differ in their seed alone one by one."""
+    """Figures of every policy, agents that differ in their seed alone one by one.
+
+    ``optimum`` (N,): RMS error of the winch-limited optimum, m; ``saturating`` (N,): where the winch saturates.
+    """
     return [_row(entry.policy, [entry], still, optimum, saturating) for entry in entries]
 
 
 def compare_families(
-    entries: Sequence[Entry], still: Episodes, optimum: Episodes | None = None, saturating: Mask | None = None
+    entries: Sequence[Entry], still: Episodes, optimum: FloatArray | None = None, saturating: Mask | None = None
 ) -> list[Row]:
-    """Figures of every policy, agents that differ in their seed alone together."""
+    """Figures of every policy as of ``compare``, agents that differ in their seed alone together."""
     return [_row(name, members, still, optimum, saturating) for name, members in families(entries)]
 
 
@@ -168,7 +173,7 @@ def family(policy: str) -> str:
 
 
 def _row(
-    name: str, members: Sequence[Entry], still: Episodes, optimum: Episodes | None, saturating: Mask | None
+    name: str, members: Sequence[Entry], still: Episodes, optimum: FloatArray | None, saturating: Mask | None
 ) -> Row:
     def each(values: Callable[[Episodes], FloatArray]) -> FloatArray:
         found = np.stack([values(member.episodes) for member in members])
@@ -179,10 +184,10 @@ def _row(
 
     reduction = np.stack([reductions(member, still) for member in members])
     count = reduction.shape[1]
-    share = share_tail = share_saturating = None
+    share = share_median = share_tail = share_saturating = None
     if optimum is not None:
-        shares = _squeezed(reduction / (1.0 - optimum.rms[:count] / still.rms[:count]))
-        share, share_tail = Interval.of(shares, np.mean), Interval.of(shares, tail_mean)
+        shares = _squeezed(reduction / (1.0 - optimum[:count] / still.rms[:count]))
+        share, share_median, share_tail = (Interval.of(shares, each) for each in (np.mean, np.median, tail_mean))
         if saturating is not None and saturating[:count].any():
             share_saturating = Interval.of(shares[..., saturating[:count]], np.mean)
     reduction = _squeezed(reduction)
@@ -195,6 +200,7 @@ def _row(
         mean=Interval.of(reduction, np.mean),
         tail=Interval.of(reduction, tail_mean),
         share=share,
+        share_median=share_median,
         share_tail=share_tail,
         share_saturating=share_saturating,
         rms=Interval.of(each(lambda e: e.rms)),

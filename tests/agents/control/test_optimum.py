@@ -8,12 +8,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from aframe_env import Crane, InvalidValue, RecordedMotion, Scenario, ScenarioDistribution, TaskConfig, Winch
+from aframe_env import TASKS, Crane, InvalidValue, RecordedMotion, Scenario, ScenarioDistribution, TaskConfig, Winch
 from agents.control.feedback import Feedback
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.optimum import CommandSequence, optimise, required_commands, saturating
+from agents.control.predictive import PlanningConfig, PredictiveControl
 from agents.policy import DrumStill
-from agents.rollout import held_out_scenarios, run
+from agents.rollout import drawn_scenarios, held_out_scenarios, run
 
 WEAK = Crane(winch=Winch(max_rope_speed=1.2, max_rope_acceleration=0.8))
 CONFIG = TaskConfig(episode_duration=30.0)
@@ -88,6 +89,19 @@ def test_a_chase_at_bounded_acceleration():
     weak = replace(scenario, crane=Crane(winch=replace(winch, max_rope_acceleration=0.25)))
     left = (0.25 - 0.125) ** 2 * 3.0**5 / 5.0
     assert optimise([weak], config).omega1[0] == pytest.approx(left, rel=0.01)
+
+
+def test_a_rope_that_parts_with_the_drum_still_is_kept_where_it_can_be():
+    """The load bobs in resonance with the sea until the rope snaps, if nobody does anything about it."""
+    kept, hopeless = (
+        TASKS["Storm"].scenarios("test", 882)[881],
+        drawn_scenarios(TASKS["Storm"].distribution, 221_000_002, 6)[5],
+    )
+    assert run(DrumStill(), [kept, hopeless]).parted.all()
+    best = optimise([kept, hopeless])
+    assert best.omega1[0] < 0.9 * run(PredictiveControl(PlanningConfig(sensors=None)), [kept]).omega1[0]
+    assert not run(CommandSequence("optimum", best.commands[:1]), [kept]).parted.any()
+    assert best.omega1[1] == np.inf
 
 
 def test_bad_starts(scenarios):

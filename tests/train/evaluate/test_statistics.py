@@ -79,10 +79,11 @@ def test_the_tail_is_the_mean_of_the_worst_twentieth():
 def test_shares_are_of_what_the_optimum_removes():
     still, best = episodes([100.0, 100.0, 100.0]), episodes([0.0, 25.0, 1.0])
     half = Entry("half", Knowledge.SENSORS, episodes([25.0, 25.0, 25.0]))
-    (row,) = compare([half], still, best, np.array([False, True, True]))
+    (row,) = compare([half], still, best.rms, np.array([False, True, True]))
     assert row.share.value == pytest.approx(np.mean([0.5, 1.0, 0.5 / 0.9]))
     assert row.share_saturating.value == pytest.approx(np.mean([1.0, 0.5 / 0.9]))
     assert row.share_tail.value == pytest.approx(0.5)
+    assert row.share_median.value == pytest.approx(0.5 / 0.9)
 
 
 def test_seeds_stand_in_one_row_whose_interval_has_both_spreads():
