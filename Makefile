@@ -51,6 +51,7 @@ results: .venv/installed-test
 	$(BIN)/python -m train.evaluate --model rfem --privileged 0 --workers 2 --overwrite --out results/comparison-full-model \
 		--policies predictive-ppo ppo sac ppo-speed sac-speed predictive-ppo-sensors ppo-sensors sac-sensors \
 		"predictive control (state)" "predictive control" "feed-forward + feedback (state)" "feed-forward + feedback"
+	$(BIN)/python -m train.benchmark --workers 1 --overwrite --out results/tasks
 	$(BIN)/python -m train.sensitivity --overwrite --out results/sensitivity
 	$(BIN)/python -m train.deep_water --overwrite --out results/deep-water
 	$(BIN)/python -m train.verify

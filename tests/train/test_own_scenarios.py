@@ -9,7 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aframe_env import InvalidValue, TaskConfig, find_task
+from agents.control.expected_waves import ExpectedWaves
 from agents.learned.agent import load
+from agents.policy import DrumStill
+from agents.rollout import run as run_policy
+from train.learn.options import LearningOptions
 from train.learn.run import main as learn
 from train.shared.scenarios import ScenarioOptions
 
@@ -78,6 +83,30 @@ def test_a_period_of_ones_own_is_compared_at_it(tmp_path, monkeypatch, capsys):
         in capsys.readouterr().err
     )
     assert not (tmp_path / "another").exists()
+
+
+def test_train_and_compare_on_a_task_of_the_suite(tmp_path, monkeypatch):
+    monkeypatch.setattr("train.evaluate.run.AFTER_TRAINING", ("winch-limited optimum",))
+    out = tmp_path / "agent"
+    few = ("--task", "unknown", "--observation", "sensors", "--eval-scenarios", 2, "--out", out)
+    monkeypatch.setattr("sys.argv", ["train.ppo", *map(str, (*TINY, *few))])
+    assert learn("ppo") == 0
+    task = find_task("Unknown")
+    card = load(out).card
+    assert card.sensors == task.distribution.sensors
+    assert card.waves == ExpectedWaves.of(task.distribution)
+    still, *_ = json.loads((out / "comparison.json").read_text(encoding="utf-8"))["policies"]
+    validation = run_policy(DrumStill(), task.scenarios("validation", 2), TaskConfig(**task.arguments))
+    assert still["rms"]["value"] == pytest.approx(np.median(validation.rms))
+
+
+def test_what_does_not_go_with_a_task_is_refused():
+    with pytest.raises(InvalidValue, match=r"scenarios = 'mine.toml': must not be given beside --task Storm"):
+        LearningOptions(task="Storm", scenarios=Path("mine.toml"))
+    with pytest.raises(InvalidValue, match=r"control_period = 0.2 s: must be 0.1 s, the task's"):
+        LearningOptions(task="Storm", control_period=0.2)
+    with pytest.raises(InvalidValue, match=r"task = 'Calm': must be one of"):
+        LearningOptions(task="Calm")
 
 
 def test_optimisers_and_sensitivity_on_ones_own(own, tmp_path, monkeypatch):

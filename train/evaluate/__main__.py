@@ -68,7 +68,7 @@ def main() -> int:
     with user_errors():
         options, console = parse(Options, "train.evaluate", __doc__ or ""), PlainConsole()
         choices = choose_all(options.policies)
-        require_period(choices, options.control_period)
+        require_period(choices, options.config.control_period)
         opened = open_jobs(options, "train.evaluate", "comparison.json")
         folder = opened.folder
         try:

@@ -17,6 +17,7 @@ from aframe_env import task
 from aframe_env.config import TaskConfig
 from aframe_env.memory import require_memory
 from aframe_env.scenario import Scenario
+from aframe_env.suite import find_task
 from aframe_env.validation import InvalidValue, require_integer
 from agents.control.optimum import saturating
 from agents.drives.optimisation import OptimisedDrive
@@ -61,15 +62,23 @@ class HeldOut(ScenarioOptions):
     """Control step, s: that at which the agents among the policies were trained."""
     episode_duration: float = TaskConfig.episode_duration
     """s."""
+    task: str | None = None
+    """Task of the suite, by name: its validation scenarios are the held-out ones, on its observation, at its period and
+    for its duration. Its test scenarios are those of train.benchmark."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.task is not None and isinstance(self.scenarios, Path):
+            raise InvalidValue(f"task = {self.task!r}: has scenarios of its own: --scenarios must be a number")
         require_integer("privileged", self.privileged or 0, low=0, high=10**6)
         self.config  # noqa: B018 - raises here, before anything is written
 
     @cached_property
     def config(self) -> TaskConfig:
         """The task."""
+        if self.task is not None:
+            arguments = find_task(self.task).arguments
+            return TaskConfig(model=self.model, rfem_modes=self.rfem_modes, **arguments)
         return TaskConfig(
             model=self.model,
             scenario=self.source,
@@ -78,6 +87,13 @@ class HeldOut(ScenarioOptions):
             observation=self.observation,
             rfem_modes=self.rfem_modes,
         )
+
+    def drawn(self) -> tuple[list[Scenario], int]:
+        """Draw the scenarios; beside them the seed of their sensors' noise."""
+        if self.task is not None:
+            found = find_task(self.task)
+            return found.scenarios("validation", self.number), found.seed("validation")
+        return held_out_scenarios(self.config.source, self.number), 0
 
 
 @dataclass(frozen=True)
@@ -146,8 +162,10 @@ def run_all(
     specs: Sequence[PolicySpec], held_out: HeldOut, console: Console, *, jobs: Path = IN_MEMORY, where: Where = HERE
 ) -> Comparison:
     """Run the drum still and every policy that was chosen over the held-out scenarios, as ``run_on`` does."""
-    scenarios = held_out_scenarios(held_out.config.source, held_out.number)
-    return run_on(specs, held_out.config, scenarios, console, privileged=held_out.privileged, jobs=jobs, where=where)
+    scenarios, seed = held_out.drawn()
+    return run_on(
+        specs, held_out.config, scenarios, console, privileged=held_out.privileged, seed=seed, jobs=jobs, where=where
+    )
 
 
 def run_on(

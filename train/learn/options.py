@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from aframe_env.config import TaskConfig
+from aframe_env.suite import find_task
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
 from agents.learned.features import Action, FeatureConfig
 from agents.learned.interface import InterfaceConfig, LearnerFeatures
@@ -45,6 +46,8 @@ class LearningOptions(RunOptions, Where):
     of which the winch saturates, and give the best that was seen. 0: give what is there at the end."""
     scenarios: Path | None = None
     """A TOML file with a scenario or a distribution of your own to learn from; by default the package's seas."""
+    task: str | None = None
+    """Task of the suite to learn, by name, as in --task Storm; compared on its validation scenarios."""
     control_period: float = TaskConfig.control_period
     """Control step, s."""
     episode_duration: float = TaskConfig.episode_duration
@@ -93,6 +96,8 @@ class LearningOptions(RunOptions, Where):
         require_integer("practice", self.practice, low=0, high=10**6)
         require_integer("selected_by", self.selected_by, low=0, high=10**5)
         require_number("control_period", self.control_period, "s", low=0.01, high=2.0)
+        if self.task is not None:
+            self._require_task()
         self.config  # noqa: B018 - raises here, before anything is written
         require_integer("batch_size", self.batch_size, low=2, high=10**9)
         require_number("learning_rate", self.learning_rate, "", low=0.0, high=1.0, low_open=True)
@@ -105,11 +110,22 @@ class LearningOptions(RunOptions, Where):
         require_integer("threads", self.threads, low=1, high=256)
         require_number("checkpoint_every", self.checkpoint_every, "s", low=0.0, high=1e9)
 
+    def _require_task(self) -> None:
+        """Raise where what is asked for does not go with the task of the suite."""
+        found = find_task(str(self.task))
+        if self.scenarios is not None:
+            raise InvalidValue(f"scenarios = {str(self.scenarios)!r}: must not be given beside --task {self.task}")
+        for name in ("control_period", "episode_duration"):
+            if getattr(self, name) != getattr(found, name):
+                raise InvalidValue(
+                    f"{name} = {getattr(self, name):g} s: must be {getattr(found, name):g} s, the task's"
+                )
+
     @cached_property
     def config(self) -> TaskConfig:
         """The task."""
         return TaskConfig(
-            scenario=self.scenarios,
+            scenario=self.scenarios if self.task is None else find_task(self.task).distribution,
             control_period=self.control_period,
             episode_duration=self.episode_duration,
             observation=self.observation,
@@ -146,6 +162,7 @@ class LearningOptions(RunOptions, Where):
             scenarios=self.scenarios or self.eval_scenarios,
             count=self.eval_scenarios if own else None,
             privileged=self.eval_privileged,
+            task=self.task,
             control_period=self.control_period,
             episode_duration=self.episode_duration,
         )

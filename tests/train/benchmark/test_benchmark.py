@@ -202,3 +202,19 @@ def test_bad_options_are_one_sentence(monkeypatch, capsys, arguments, says):
     with pytest.raises(SystemExit):
         command(monkeypatch, *arguments)
     assert says in capsys.readouterr().err
+
+
+def test_the_page_of_the_tasks_says_what_the_leaderboard_does():
+    root = Path(__file__).parents[3]
+    rows = leaderboard.read(root / "results/tasks/leaderboard.json")
+    lines = (root / "docs/tasks.md").read_text(encoding="utf-8").splitlines()
+    for task in TASKS.values():
+        ours = [row for row in rows if row.task == task.id and row.scenarios == 100]
+        (best,) = [row for row in ours if row.policy == "winch-limited optimum"]
+        law = max((row for row in ours if row.knows == "sensors" and not row.sha256), key=lambda row: row.share.value)
+        (line,) = [line for line in lines if line.startswith(f"| [`{task.id}`]")]
+        said = [cell.strip() for cell in line.strip("|").split("|")]
+        assert said[1] == task.isolates
+        assert said[2] == f"{best.reduction.value:.1%}".replace("%", " %")
+        figures = f"{law.share.value:.1%}, {law.share_worst.value:.1%}".replace("%", " %")
+        assert said[3] == f"{law.policy}, {figures}"
