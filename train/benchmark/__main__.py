@@ -126,7 +126,7 @@ def run(options: Options, console: Console) -> int:
     except KeyboardInterrupt:
         console.print("interrupted: what is finished is kept; the same command goes on from there")
         return 130
-    every = leaderboard.merged(leaderboard.read(board), rows)
+    every = leaderboard.merged(leaderboard.read(board), rows, yardsticks=options.leaderboard is None)
     leaderboard.write(board, every)
     for folder in dict.fromkeys((board.parent, opened.folder)):
         page.write_page(folder, every)

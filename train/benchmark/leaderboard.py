@@ -17,13 +17,15 @@ from aframe_env.suite import TASKS, Split, Task
 from aframe_env.text import read_json
 from aframe_env.validation import InvalidValue
 from agents.policy import Knowledge
-from agents.registry import OPTIMUM
+from agents.registry import DRUM_STILL, OPTIMUM
 from train.benchmark.ceiling import Ceiling
 from train.evaluate.statistics import Interval, Row, family
 from train.shared.run_folder import versions, write_json
 
 NAME: Final = "leaderboard.json"
 FORM: Final = 1
+YARDSTICKS: Final = (OPTIMUM.name, DRUM_STILL.name)
+"""Policies that every run has: they are nobody's."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +66,7 @@ class LeaderboardRow:
     @property
     def key(self) -> tuple[Any, ...]:
         """What a leaderboard has one row for."""
-        return self.task, self.split, self.scenarios, self.policy, self.by
+        return self.task, self.split, self.scenarios, self.policy, "" if self.policy in YARDSTICKS else self.by
 
     def require_sound(self, where: str) -> None:
         """Raise where a row cannot be what it says; ``where`` is named first."""
@@ -161,9 +163,15 @@ def require_room(
             )
 
 
-def merged(old: Sequence[LeaderboardRow], new: Sequence[LeaderboardRow]) -> list[LeaderboardRow]:
-    """Rows of both, new ones in the place of old ones of the same policy; the best of each task first."""
-    found = {row.key: row for row in (*old, *new)}
+def merged(
+    old: Sequence[LeaderboardRow], new: Sequence[LeaderboardRow], *, yardsticks: bool = True
+) -> list[LeaderboardRow]:
+    """Rows of both, new ones in the place of old ones of the same policy; the best of each task first.
+
+    Without ``yardsticks`` ceiling and drum still, which every run has, stay as they are where they are there already.
+    """
+    found = {row.key: row for row in old}
+    found |= {row.key: row for row in new if yardsticks or row.key not in found or row.policy not in YARDSTICKS}
     return sorted(found.values(), key=lambda row: (row.task, row.split, row.scenarios, -row.share.value, row.policy))
 
 

@@ -14,8 +14,8 @@ from matplotlib.patches import Patch
 
 from aframe_env.suite import TASKS
 from agents.policy import Knowledge
-from agents.registry import DRUM_STILL, OPTIMUM
-from train.benchmark.leaderboard import LeaderboardRow
+from agents.registry import OPTIMUM
+from train.benchmark.leaderboard import YARDSTICKS, LeaderboardRow
 from train.evaluate.figure import COLOURS
 from train.evaluate.statistics import Interval
 from train.shared.markdown import table
@@ -84,7 +84,7 @@ def _cells(row: LeaderboardRow) -> tuple[str, ...]:
 
 def draw(path: Path, rows: Sequence[LeaderboardRow]) -> None:
     """Draw mean and worst 5 % of every policy as bars, a panel for each task."""
-    tables = _tables(row for row in rows if row.policy not in (DRUM_STILL.name, OPTIMUM.name))
+    tables = _tables(row for row in rows if row.policy not in YARDSTICKS)
     columns = min(2, max(1, len(tables)))
     lines = max(1, -(-len(tables) // columns))
     most = max((len(group) for _, group in tables), default=1)
