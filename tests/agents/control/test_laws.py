@@ -273,7 +273,7 @@ def test_a_load_pin_that_is_off_by_a_tenth_is_borne(make, factor):
 def test_a_ship_that_moves_already_costs_the_sensors_little(make):
     """Most of what is left is the task's: the load begins off its level. Told of it, the filters add little to that."""
     source = ScenarioDistribution(ramp=0.0)
-    scenarios = held_out_scenarios(source, 24)
+    scenarios = held_out_scenarios(source, 96)
     expected, from_rest = (ExpectedWaves.of(each) for each in (source, ScenarioDistribution()))
     assert (expected.build_up, from_rest.build_up) == (0.0, ScenarioDistribution().ramp)
     sensed, seen, misled = (
