@@ -101,9 +101,10 @@ class Task:
 
 
 def _facts(scenario: Scenario) -> list[str]:
-    """Everything that a draw decides, to nine digits: what the ship does, what is lifted and by what, what is told.
+    """Everything that a draw decides, what the ship does, what is lifted and by what, what is told.
 
-    Numbers, not files: a field that is added to a scenario, and that a task leaves as it is, changes nothing of it.
+    Numbers, not files: a field that is added to a scenario, and that a task leaves as it is, changes nothing of it. Six
+    digits, so that no processor's rounding is taken for a change.
     """
     motion = scenario.motion
     assert has_components(motion)
@@ -114,4 +115,4 @@ def _facts(scenario: Scenario) -> list[str]:
         numbers += [each.load_mass, each.target_level, each.free_length, each.rope_damping, each.ramp]
         numbers += [rope.axial_stiffness, rope.mass_per_length, winch.max_rope_speed, winch.max_rope_acceleration]
         numbers += [winch.lag, -1.0 if each.sensor_delay is None else each.sensor_delay]
-    return [f"{number:.9g}" for number in numbers]
+    return [f"{number:.6g}" for number in numbers]

@@ -20,8 +20,8 @@ TASK: Final = Task(
     seeds=Seeds(train=221_000_001, validation=221_000_002, test=221_000_003),
     left_out={"validation": frozenset({5})},
     digests={
-        "train": "905de85def9ab46fcff1082757cd793dbfbcbdec04ed44047715bfc76e69d841",
-        "validation": "bed43384e6a7980d440e421831325bf1a61c984be0b22d0320eddfebed2cd6c9",
-        "test": "969b9d1607f1edca5c59815749126c7cc8b3f80f6fad750dde0e5c3459322d24",
+        "train": "2ec56a9a6ad817531709816ff4ccccd8fc3645cc0688fdc00054b825b3159140",
+        "validation": "b05e3a8cf208686754d276fc41270e1cf0d7d98099fa87958747d8b50f5eadab",
+        "test": "385108d008636f7213d0bc600388df9968c2a7759aa925b0ca7e7e7da8b94030",
     },
 )

@@ -22,8 +22,8 @@ TASK: Final = Task(
     ),
     seeds=Seeds(train=222_000_001, validation=222_000_002, test=222_000_003),
     digests={
-        "train": "4f93a661dc51d3c1ca960dc03959932c75283439f72f5520a27ad2da9e97e969",
-        "validation": "243917b2feb172f248be89cf00dba3735aa9718da22a970c3fd2386e10c524a5",
-        "test": "b7714b5e7cbd9f80f301831b5574d6870a70ce535d519eb100933ff6a1261692",
+        "train": "ada389d0ab6a5b75232eb9da63a7778e045c3d7cdeb651212686ff652d8117d4",
+        "validation": "0f2f769f8bac6f61aee7e628a2cda6793432d98d4e4084e4d8af8f8b93a44c54",
+        "test": "22a2dcf82844f9cc06869ee1b901a690a55b76954aba15e2e3d977f3c148f69e",
     },
 )
