@@ -1,6 +1,7 @@
 from .config import TaskConfig
 from .scenario.crane import Compensator, Crane, Frame, Rope, Winch
 from .scenario.distribution import ScenarioDistribution
+from .scenario.drive import TorqueDrive
 from .scenario.file import read_scenario, read_scenarios, scenario_text
 from .scenario.loads import LOADS, ReadyLoad
 from .scenario.luffing import Luffing
@@ -56,6 +57,7 @@ __all__ = [
     "Task",
     "TaskConfig",
     "Told",
+    "TorqueDrive",
     "Vessel",
     "Water",
     "Winch",

@@ -105,6 +105,8 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     a seabed, `landings` and `lift_offs` are counted so far, `landing_speed` [m/s] is the greatest of all landings, and
     `contact_force` [N] the greatest within the last step. `pulley_position` (3,) [m] is that of S with the frame rigid,
     `luffing_angle` [rad] the frame's at the time.
+    `contact_force` [N] the greatest within the last step. Of a drive (`Winch(drive=TorqueDrive())`, else 0)
+    `drive_torque` [N m] is the torque at the drum, positive paying out, and `drive_power` [W] what the motors give.
 
     With `model="rfem"` also, vectors along the deck's axes: `pulley_deflection` (3,) [m] of S on the frame;
     `foot_reactions` (2, 3) [N], forces on the frame at A_R and A_L; `servomotor_tensions` (2,) [N] of S_R and S_L;

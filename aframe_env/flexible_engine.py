@@ -124,6 +124,10 @@ class FlexibleEngine(Engine):
             raise InvalidValue(
                 f'luffing = {shown(scenario.luffing)}: model = "rfem" has no frame that luffs: must be None'
             )
+        if scenario.crane.winch.drive is not None:
+            raise InvalidValue(
+                f'drive = {shown(scenario.crane.winch.drive)}: model = "rfem" has no drum with inertia: must be None'
+            )
         row = super().row_vector(scenario)
         frame = np.zeros(self._slots)
         frame[flex.FRAME] = self._line(scenario)

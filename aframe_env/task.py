@@ -88,7 +88,8 @@ SENSED: Final = (
 TIME, LOAD, TENSION, SLACK, OMEGA1, OMEGA2, COST, PARTED = 0, 1, 4, 5, 6, 7, 8, 9
 LOAD_TENSION, TARGET, CONTACT, LANDINGS, LIFT_OFFS, LANDING_SPEED = 10, 11, 12, 13, 14, 15
 PULLEY, LUFFING_ANGLE = 16, 19
-RESULTS: Final = 20
+DRIVE_TORQUE, DRIVE_POWER = 20, 21
+RESULTS: Final = 22
 
 
 def box(quantities: tuple[Quantity, ...]) -> spaces.Box:
@@ -193,6 +194,8 @@ def read_out(row: Any, lanes: int, j: int, state: Any, results: Any, i: int) -> 
     for k in range(3):
         results[i, PULLEY + k] = row[(at.PULLEY + k) * lanes + j]
     results[i, LUFFING_ANGLE] = row[at.LUFFING_ANGLE * lanes + j]
+    results[i, DRIVE_TORQUE] = row[at.DRIVE_TORQUE * lanes + j]
+    results[i, DRIVE_POWER] = row[at.DRIVE_POWER * lanes + j]
 
 
 @cache
@@ -244,6 +247,8 @@ def info(results: FloatArray, frames: FloatArray | None) -> dict[str, npt.NDArra
         "landing_speed": results[:, LANDING_SPEED],
         "pulley_position": results[:, PULLEY : PULLEY + 3],
         "luffing_angle": results[:, LUFFING_ANGLE],
+        "drive_torque": results[:, DRIVE_TORQUE],
+        "drive_power": results[:, DRIVE_POWER],
     }
     if frames is not None:
         found |= {

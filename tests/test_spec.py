@@ -261,6 +261,8 @@ def test_information_is_arrays() -> None:
         "landing_speed": ((), "float64"),
         "pulley_position": ((3,), "float64"),
         "luffing_angle": ((), "float64"),
+        "drive_torque": ((), "float64"),
+        "drive_power": ((), "float64"),
     }
     before = info["time"].item()
     env.step(np.zeros(1, dtype=np.float32))

@@ -23,6 +23,7 @@ from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.blocks import put_three
 from aframe_env.dynamics.compensator import give
 from aframe_env.dynamics.compiling import fma, larger, scalar, select, smaller
+from aframe_env.dynamics.drive import drive_drum, place_drum
 from aframe_env.dynamics.layout import SPRINGS_MOST, Span
 from aframe_env.dynamics.lift import (
     AXIS,
@@ -158,6 +159,7 @@ def stage(
     Springs go by a loop within each lane, which is quick to compile.
     """
     lanes = span.stride
+    place_drum(row, source, end, span)
     give(row, source, target, end, fraction, weight, span)
     for j in range(span.begin, span.end):
         line, rope = aim(row, source, end, lanes, j), divide(row, source, end, lanes, j)
@@ -166,6 +168,7 @@ def stage(
             pull = spring(row, i, source, target, fraction, weight, lanes, j, line, rope, pull)
         tell(row, lanes, j, line, rope, pull)
         pull_load(row, source, target, end, fraction, weight, lanes, j, line, rope, pull)
+    drive_drum(row, source, target, end, fraction, weight, span)
 
 
 @scalar
@@ -177,6 +180,7 @@ def wide_stage(
     A spring beyond a rope's top does nothing; most ropes are chains of nine lumps or single springs.
     """
     lanes, s, t, f, w = span.stride, source, target, fraction, weight
+    place_drum(row, source, end, span)
     give(row, source, target, end, fraction, weight, span)
     if most == 1:
         for j in range(span.begin, span.end):
@@ -197,6 +201,7 @@ def wide_stage(
             pull = spring(row, 8, s, t, f, w, lanes, j, line, rope, pull)
             pull = spring(row, 9, s, t, f, w, lanes, j, line, rope, pull)
             pull_load(row, source, target, end, fraction, weight, lanes, j, line, rope, pull)
+    drive_drum(row, source, target, end, fraction, weight, span)
 
 
 @scalar

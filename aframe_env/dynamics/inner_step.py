@@ -8,6 +8,7 @@ import numpy.typing as npt
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.blocks import put_three, three
 from aframe_env.dynamics.compiling import fma, larger, scalar, select
+from aframe_env.dynamics.drive import exchange_drum, settle_drum, take_wanted
 from aframe_env.dynamics.heavy_rope import lift_step, stage
 from aframe_env.dynamics.layout import Span
 from aframe_env.dynamics.lift import COST, END_TARGET, GROUND, PEAK, SLACKEST, put_end
@@ -184,6 +185,7 @@ def put_end_on_path(row: Array, slot: int, lanes: int, j: int, end: RopeEnd, sin
 def heavy_inner_step(row: Array, index: int, most: int, wide: bool, span: Span) -> None:
     """Make inner step ``index`` in lanes whose ropes have mass or whose loads are in water, as ``inner_step`` does."""
     lanes = span.stride
+    exchange_drum(row, span)
     for j in range(span.begin, span.end):
         active = index < row[at.SUBSTEPS * lanes + j]
         full, since_node = row[at.INNER_STEP * lanes + j], row[at.ELAPSED * lanes + j]
@@ -194,8 +196,11 @@ def heavy_inner_step(row: Array, index: int, most: int, wide: bool, span: Span) 
         put_end_on_path(row, at.ENDS + 2 * at.END_SIZE, lanes, j, end, place + full)
         row[at.STEP_LENGTH * lanes + j] = select(active, full, 0.0)
         row[at.MOMENT * lanes + j] = place + 0.5 * full - since_node
+    take_wanted(row, span)
+    exchange_drum(row, span)
     move_target(row, span)
     lift_step(row, most, wide, span)
+    settle_drum(row, span)
     meet_bed(row, span)
     for j in range(span.begin, span.end):
         step = row[at.STEP_LENGTH * lanes + j]
@@ -217,6 +222,7 @@ def measure_heavy(row: Array, most: int, span: Span) -> None:
         since_node = row[at.ELAPSED * lanes + j] + row[at.CONTROL_PERIOD * lanes + j]
         reach = reach_on_path(row, since_node, lanes, j)
         put_end(row, at.ENDS, lanes, j, end, three(row, at.PULLEY + 6, lanes, j), reach)
+        row[at.WANTED * lanes + j] = row[at.SET_SPEED * lanes + j]
         row[at.STEP_LENGTH * lanes + j] = 0.0
         row[(at.STAGE + SLACKEST) * lanes + j] = 1.0
         # What the water does has been followed to the middle of the last inner step; it goes on to its end.

@@ -54,6 +54,20 @@ STROKE: Final = _take(1)
 """Rope that a passive compensator has paid out, m."""
 DRUM_ANGLE: Final = _take(1)
 DRUM_SPEED: Final = _take(1)
+INTEGRAL: Final = _take(1)
+"""Integral part of a drive's speed loop: torque at the drum, N m."""
+FILTERED: Final = _take(1)
+"""Tension as a drive's filter has it, N."""
+SET_ANGLE: Final = _take(1)
+"""Angle of a drum that goes as it is told within its limits, from the real one's at the segment's start, rad."""
+SET_SPEED: Final = _take(1)
+"""Its speed: what a drive's loop wants, rad/s."""
+BRAKED: Final = _take(1)
+"""1 where a drive's brake has fallen."""
+DRIVE_TORQUE: Final = _take(1)
+"""Torque of a drive at the drum, N m; positive pays out."""
+DRIVE_POWER: Final = _take(1)
+"""Power that its motors give, W; negative where the load drives them."""
 COMMAND: Final = _take(1)
 PULLEY: Final = _take(9)
 """Pulley S in the base frame: position, velocity, acceleration."""
@@ -222,6 +236,23 @@ GAS: Final = _take(4)
 """Passive compensator: force of its gas at mid-stroke [N], length of its gas column [m], exponent, damping [N s/m]."""
 HALF_STROKE: Final = _take(1)
 """Half the stroke of a passive compensator, m of rope; 0 for none."""
+DRIVE: Final = _take(1)
+"""Inertia of a drum that a drive turns, kg m²; 0 where the drum goes as it is told."""
+GAIN: Final = _take(1)
+"""Torque that the speed loop asks for by 1 rad/s of error, N m s."""
+INTEGRAL_RATE: Final = _take(1)
+"""One over the time constant of its integral part, 1/s."""
+FEEDFORWARD: Final = _take(1)
+"""Share of the measured tension that the loop is relieved of."""
+FILTER_RATE: Final = _take(1)
+"""One over the time constant of the tension's filter, 1/s; 0 for none."""
+MOTOR: Final = _take(2)
+"""Greatest torque of the motors, at the drum without the gear's losses [N m], and their greatest power [W]."""
+GEAR: Final = _take(3)
+"""Torque at the drum over that of the motors: mean of both ways, half their difference, and the drum's speed at which
+70 % of that have built up [rad/s]."""
+BRAKE: Final = _take(1)
+"""Torque up to which the brake holds, N m; 0 for none."""
 
 # Scratch of one control step.
 DUE: Final = _take(1)
@@ -235,8 +266,8 @@ STIFFNESS: Final = _take(1)
 """c_R of the rope at the start of the inner step."""
 STEP_LENGTH: Final = _take(1)
 """Length of the inner step; 0 where the row stands still."""
-LIFT_SIZE: Final = 2 * SPRINGS_MOST + 7
-"""Slots from LIFT to the compensator's stroke."""
+LIFT_SIZE: Final = 2 * SPRINGS_MOST + 11
+"""Slots from LIFT to the drive's filter."""
 LIFT_A: Final = _take(LIFT_SIZE)
 """Nodes and load as in LIFT at a stage of the Runge-Kutta scheme."""
 LIFT_B: Final = _take(LIFT_SIZE)
@@ -253,6 +284,8 @@ FLOW_RATE: Final = _take(3)
 """Its acceleration over the segment, m/s²."""
 SURFACE: Final = _take(2)
 """Level of the surface about the load at the start of a segment, m, and its rate, m/s."""
+WANTED: Final = _take(3)
+"""Speed that a drive's loop wants at start, middle and end of the inner step, rad/s."""
 MOMENT: Final = _take(1)
 """Time since the start of the segment at which the water about the load is taken, s."""
 PUSH: Final = _take(6)

@@ -22,6 +22,10 @@ SPEED: Final = SPRINGS_MOST
 POSITION: Final = 2 * SPRINGS_MOST
 VELOCITY: Final = POSITION + 3
 STROKE: Final = POSITION + 6
+TURN: Final = STROKE + 1
+TURN_RATE: Final = STROKE + 2
+INTEGRAL: Final = STROKE + 3
+FILTERED: Final = STROKE + 4
 
 # Places in one of ENDS.
 END_VELOCITY: Final = 3

@@ -12,6 +12,7 @@ from numba import prange
 
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar
+from aframe_env.dynamics.drive import begin_drive, exchange_drum, hold_load
 from aframe_env.dynamics.drum import limit_drum
 from aframe_env.dynamics.heavy_rope import springs_of
 from aframe_env.dynamics.inner_step import (
@@ -44,9 +45,12 @@ def advance_any(row: Array, components: int, records: Array, span: Span) -> None
 
 @scalar
 def plan_any(row: Array, span: Span) -> None:
-    """Plan the winches of lanes with ropes of either kind, by what power and torque allow."""
+    """Plan the winches of lanes with ropes of either kind, by what power and torque allow, or what a drive wants."""
     limit_drum(row, span)
+    begin_drive(row, span)
+    exchange_drum(row, span)
     plan_winch(row, span)
+    exchange_drum(row, span)
 
 
 @scalar
@@ -67,6 +71,7 @@ def start_any(row: Array, span: Span) -> None:
     """Meet the water, and measure tension and slackness of lanes with ropes of either kind, at the start."""
     begin_water_at_node(row, span)
     measure_any(row, span)
+    hold_load(row, span)
 
 
 @scalar

@@ -2,6 +2,7 @@
 
 from aframe_env.scenario.crane import GRAVITY, Compensator, Crane, Frame, Rope, Winch
 from aframe_env.scenario.distribution import NUMBERS, ScenarioDistribution, ScenarioSource
+from aframe_env.scenario.drive import TorqueDrive
 from aframe_env.scenario.interval import Range
 from aframe_env.scenario.loads import LOADS, ReadyLoad
 from aframe_env.scenario.luffing import Luffing
@@ -43,6 +44,7 @@ __all__ = [
     "ShipMotion",
     "TargetPath",
     "Told",
+    "TorqueDrive",
     "Vessel",
     "Water",
     "Winch",

@@ -13,6 +13,7 @@ from functools import cached_property
 
 from aframe_env.dynamics.start import free_length, radius_of_layer
 from aframe_env.scenario.cross_sections import FrameStructure
+from aframe_env.scenario.drive import TorqueDrive
 from aframe_env.validation import InvalidValue, require_instance, require_number, require_vector
 
 Vector = tuple[float, float, float]
@@ -136,6 +137,8 @@ class Winch:
     """Of drum and drive about the drum's axis, kg m²; goes with ``max_torque``."""
     drum_width: float = 0.0
     """Width that the rope is wound on in layers, m; 0: one layer, however long the rope is."""
+    drive: TorqueDrive | None = None
+    """What turns a drum with inertia; None: the drum follows its command as far as the limits above let it."""
 
     def __post_init__(self) -> None:
         require_number("drum_diameter", self.drum_diameter, "m", low=1e-3, high=1e3)
@@ -152,6 +155,14 @@ class Winch:
             raise InvalidValue(
                 f"max_torque = {self.max_torque!r} N m, inertia = {self.inertia!r} kg m²: must both be 0, or neither"
             )
+        if self.drive is not None:
+            require_instance("drive", self.drive, TorqueDrive)
+            for name, unit in (("max_power", "W"), ("max_torque", "N m")):
+                if getattr(self, name):
+                    raise InvalidValue(
+                        f"{name} = {getattr(self, name)!r} {unit}: a drive has its own, motor_power and motor_torque: "
+                        f"must be 0 {unit}"
+                    )
 
     @property
     def drum_radius(self) -> float:
@@ -260,7 +271,8 @@ class Crane:
     def is_plain(self) -> bool:
         """Whether the winch has the paper's limits alone, and drum and pulley nothing but rope between them."""
         winch = self.winch
-        return not (winch.max_power or winch.max_torque or winch.drum_width or self.sheave_friction or self.compensator)
+        further = winch.max_power or winch.max_torque or winch.drum_width or winch.drive
+        return not (further or self.sheave_friction or self.compensator)
 
     def free_length(self, rope_length: float, weight: float) -> float:
         """Unstretched rope [m] between drum and a load of ``weight`` N that hangs ``rope_length`` m below the pulley.

@@ -320,7 +320,7 @@ class ScenarioDistribution:
 
     def _crane(self, u_rope: np.ndarray) -> Crane:
         """The crane with the rope and winch that are drawn."""
-        drawn = {
+        drawn: dict[str, Any] = {
             name: within(value, float(u_rope[place]))
             for name, place in (("axial_stiffness", 2), ("max_rope_speed", 4), ("max_rope_acceleration", 5), ("lag", 6))
             if (value := getattr(self, name)) is not None

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.start import write_heavy, write_lift
 from aframe_env.scenario.crane import Frame
+from aframe_env.scenario.drive import GEAR_CREEP, TorqueDrive
 from aframe_env.scenario.luffing import Luffing
 from aframe_env.scenario.scenario import Scenario
 from aframe_env.scenario.sea import SeaMotion
@@ -98,6 +99,8 @@ def _fill_beyond_the_paper(row: FloatArray, scenario: Scenario) -> None:
         preload = cylinder.preload or scenario.hanging_weight
         row[at.GAS : at.GAS + 4] = preload, cylinder.gas_length, cylinder.exponent, cylinder.damping
         row[at.HALF_STROKE] = 0.5 * cylinder.stroke
+    if winch.drive is not None:
+        _fill_drive(row, winch.drive, winch.drum_radius)
     row[at.BED] = NO_BED
     if scenario.water is not None:
         _fill_water(row, scenario, scenario.water)
@@ -111,6 +114,17 @@ def _fill_luffing(row: FloatArray, luffing: Luffing, frame: Frame) -> None:
         first = at.LUFFING + part * at.LUFFING_MOST
         row[first : first + len(strokes)] = [stroke[part] for stroke in strokes]
     row[at.LUFFING_FRAME : at.LUFFING_FRAME + 3] = frame.servomotor_height, frame.servomotor_deck_x, frame.height
+
+
+def _fill_drive(row: FloatArray, drive: TorqueDrive, radius: float) -> None:
+    """Write what turns a drum with inertia."""
+    row[at.DRIVE] = drive.inertia
+    row[at.GAIN], row[at.INTEGRAL_RATE] = drive.gain, 1.0 / drive.integral_time
+    row[at.FEEDFORWARD] = drive.tension_feedforward
+    row[at.FILTER_RATE] = 1.0 / drive.tension_filter if drive.tension_filter else 0.0
+    row[at.MOTOR : at.MOTOR + 2] = drive.torque, drive.motor_power
+    row[at.GEAR : at.GEAR + 3] = *drive.gear, GEAR_CREEP / radius
+    row[at.BRAKE] = drive.brake_torque
 
 
 def _fill_water(row: FloatArray, scenario: Scenario, water: Water) -> None:

@@ -231,9 +231,9 @@ class Scenario:
         """Raise where the waves in the rope are too fast for the inner step."""
         if self.attached_step < SHORTEST_CHAIN_STEP:
             raise InvalidValue(
-                f"seabed, compensator, or drag and slam on a load of {self.load_mass:g} kg need steps of "
-                f"{self.attached_step:.2g} s: must be at least {SHORTEST_CHAIN_STEP:g} s: make them softer or smaller, "
-                "or the load heavier"
+                f"seabed, compensator, drive, or drag and slam on a load of {self.load_mass:g} kg need steps of "
+                f"{self.attached_step:.2g} s: must be at least {SHORTEST_CHAIN_STEP:g} s: make them softer, slower or "
+                "smaller, or load and drum heavier"
             )
         if self.chain_step < SHORTEST_CHAIN_STEP:
             raise InvalidValue(
@@ -345,9 +345,9 @@ class Scenario:
     def attached_step(self) -> float:
         """Longest inner step for what is about load and drum, s; inf in air with nothing attached.
 
-        Stable for seabed, drag and passive compensator, and short beside the surface's slam.
+        Stable for seabed, drag, passive compensator and drive, and short beside the surface's slam.
         """
-        rates = [self._compensator_rate, *self._water_rates]
+        rates = [self._compensator_rate, *self._drive_rates, *self._water_rates]
         return 1.0 / max(rates) if any(rates) else math.inf
 
     @property
@@ -355,10 +355,21 @@ class Scenario:
         """Rate at which a passive compensator gives way to the rope's spring, halved, 1/s."""
         if self.crane.compensator is None:
             return 0.0
+        stiffness = self._top_stiffness
+        return 0.5 * stiffness / (self.crane.compensator.damping + stiffness * self.loss_time)
+
+    @property
+    def _drive_rates(self) -> list[float]:
+        """Rates of what turns a drum with inertia, on the rope's spring, each by what a step may be of it, 1/s."""
+        winch = self.crane.winch
+        return [] if winch.drive is None else winch.drive.rates(self._top_stiffness, self.loss_time, winch.drum_radius)
+
+    @property
+    def _top_stiffness(self) -> float:
+        """Stiffness of the rope's uppermost spring with a tenth of the rope wound up, N/m."""
         below, drum_part = self.lengths
         top = drum_part + (0.45 * below / (self.springs - 1) if self.springs > 1 else 0.9 * below)
-        stiffness = self.crane.rope.axial_stiffness / top
-        return 0.5 * stiffness / (self.crane.compensator.damping + stiffness * self.loss_time)
+        return self.crane.rope.axial_stiffness / top
 
     @property
     def _water_rates(self) -> list[float]:

@@ -31,7 +31,7 @@ from aframe_env.dynamics.water import begin_water
 from aframe_env.engine import Engine
 from aframe_env.scenario import Scenario
 from aframe_env.scenario.motion import require_coverage
-from aframe_env.validation import InvalidValue, require_number
+from aframe_env.validation import InvalidValue, require_number, shown
 from agents.drives.following import played
 from agents.drives.functions import Drive
 
@@ -221,6 +221,10 @@ def _control_steps(duration: float, control_period: float) -> int:
 def _require_plain_drum(scenario: Scenario) -> None:
     """Raise where the drum does not simply go where a drive has it."""
     winch = scenario.crane.winch
+    if winch.drive is not None:
+        raise InvalidValue(
+            f"drive = {shown(winch.drive)}: drives are optimised for a drum that turns as it is told: must be None"
+        )
     for name, unit in (("max_power", "W"), ("max_torque", "N m"), ("drum_width", "m")):
         if getattr(winch, name):
             raise InvalidValue(

@@ -139,6 +139,18 @@ def solve(
         mass = scenario.load_mass
         return [y[3], y[4], y[5], f1 / mass, f2 / mass, f3 / mass - scenario.gravity, error * error]
 
+    return integrate(slope, times, y, breaks, max_step)
+
+
+def integrate(
+    slope: Callable[[float, FloatArray], list[float]],
+    times: FloatArray,
+    start: FloatArray,
+    breaks: Iterable[float] = (),
+    max_step: float = 0.1,
+) -> FloatArray:
+    """States (T, n) at ``times``, from ``start`` at the first of them."""
+    y = start
     out = [y]
     # Steps end at every kink; stops that differ by rounding are one.
     stops = np.unique(np.round(np.concatenate([list(breaks), times[[0, -1]]]), 9))

@@ -28,6 +28,7 @@ from aframe_env import (
     Sensors,
     TargetPath,
     Told,
+    TorqueDrive,
     Vessel,
     Water,
     Winch,
@@ -59,6 +60,7 @@ TABLES = {
     _Luffing: "## `[luffing]`",
     Water: "## `[water]`",
     Seabed: "`[water.seabed]`:",
+    TorqueDrive: "`[crane.winch.drive]`:",
     Compensator: "`[crane.compensator]`:",
     LoadShape: "`[load]`:",
 }

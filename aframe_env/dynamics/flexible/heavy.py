@@ -192,9 +192,9 @@ def step_heavy_rope(row: Array, frame: Array, table: Array, index: int, span: Sp
     give, give_rate = nine(table, flex.GIVE + 18, 1, 0), nine(table, flex.GIVE_RATE + 18, 1, 0)
     for k in range(at.END_SIZE):
         row[(START + k) * lanes + j] = row[(END + k) * lanes + j]
+    drum = turn_drum(row, index, h, lanes, j)
     for k in range(at.LIFT_SIZE):
         frame[(flex.HELD + k) * lanes + j] = row[(at.LIFT + k) * lanes + j]
-    drum = turn_drum(row, index, h, lanes, j)
     row[at.STEP_LENGTH * lanes + j] = h
     row[at.MOMENT * lanes + j] = (index + 0.5) * h
     force = three(frame, flex.PULL, lanes, j)
