@@ -42,8 +42,9 @@ class TorqueDrive:
     """Frequency of the speed loop's poles, with the drum's inertia alone, rad/s; 5 to 10 for winches of this size."""
     damping_ratio: float = 1.0
     """Damping of these poles."""
-    tension_feedforward: float = 1.0
-    """Share of the measured tension's torque that the loop is relieved of; 0 for none."""
+    tension_feedforward: float = 0.0
+    """Share of the measured tension's torque that the loop is relieved of; 0 for none: a drum that gives way to the
+    load's bobbing damps it."""
     tension_filter: float = 0.1
     """Time constant of the load pin's filter, s; 0 for none."""
 

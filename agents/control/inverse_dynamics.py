@@ -32,11 +32,12 @@ class RequiredRope:
 
     def __init__(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         self._half = 0.5 * control_period
-        self._heavy = np.array([not s.is_light for s in scenarios])
+        held = [_held(scenario) for scenario in scenarios]
+        self._heavy = np.array([not s.is_light for s in held])
         # Of light ropes only the pulley is looked at: their loads may bob as they like.
         self._engine = Engine(len(scenarios), self._half, max_inner_step=None if self._heavy.any() else 0.2)
-        for i, scenario in enumerate(scenarios):
-            self._engine.reset_row(i, _unbreakable(scenario))
+        for i, scenario in enumerate(held):
+            self._engine.reset_row(i, scenario)
         self._still = np.zeros(len(scenarios))
         self._level = np.array([s.target_level for s in scenarios])
         self._weight = np.array([s.weight for s in scenarios])
@@ -77,8 +78,10 @@ class RequiredRope:
         return np.asarray(rate[:, None] * (pulley[:, :2] - self._place))
 
 
-def _unbreakable(scenario: Scenario) -> Scenario:
-    """The scenario with a heavy rope that does not part, however its load may bob while the drum stands still."""
+def _held(scenario: Scenario) -> Scenario:
+    """The scenario with a drum that stands still, and a heavy rope that does not part, however its load may bob."""
+    if scenario.crane.winch.drive is not None:
+        scenario = replace(scenario, crane=replace(scenario.crane, winch=replace(scenario.crane.winch, drive=None)))
     if scenario.is_light:
         return scenario
     rope = replace(scenario.crane.rope, breaking_load=1e12)

@@ -25,6 +25,7 @@ from aframe_env import (
     Seabed,
     Sensors,
     TargetPath,
+    TorqueDrive,
     Water,
 )
 from aframe_env.scenario.motion import COORDINATES, Harmonic, HarmonicMotion, ShipMotion
@@ -126,6 +127,8 @@ def cranes(draw: st.DrawFn) -> Crane:
     crane: Crane = changed(Crane(), draw)
     if draw(st.booleans()):
         crane = made(lambda: replace(crane, compensator=changed(Compensator(), draw)))
+    if draw(st.booleans()):
+        crane = made(lambda: replace(crane, winch=replace(crane.winch, drive=changed(TorqueDrive(), draw))))
     return crane
 
 

@@ -13,7 +13,9 @@ from aframe_env import (
     RecordedMotion,
     Scenario,
     ScenarioDistribution,
+    TorqueDrive,
     Vessel,
+    Winch,
 )
 from aframe_env.scenario.crane import Crane, Frame
 from aframe_env.scenario.cross_sections import FrameStructure, ISection, Servomotor, Tube
@@ -94,6 +96,14 @@ def test_files_are_looked_for_beside_the_scenario(tmp_path):
     assert motion.vessel.path == tmp_path / "ship.csv"
     assert motion.vessel.deck_position == (-30.0, 0.0, 4.0)
     assert back(Scenario(motion=motion), tmp_path).motion.vessel.deck_position == (-30.0, 0.0, 4.0)
+
+
+def test_the_drive_of_a_winch_comes_back(tmp_path):
+    (tmp_path / "empty.toml").write_text("[crane.winch.drive]\n")
+    assert read_scenario(tmp_path / "empty.toml").crane.winch.drive == TorqueDrive()
+    scenario = Scenario(crane=Crane(winch=Winch(drive=TorqueDrive(bandwidth=6.0, tension_feedforward=0.5))))
+    assert back(scenario, tmp_path) == scenario
+    assert back(Scenario(), tmp_path).crane.winch.drive is None
 
 
 def test_what_no_file_holds_can_not_be_written():

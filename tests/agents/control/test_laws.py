@@ -5,7 +5,19 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_discrete_are
 
-from aframe_env import Crane, Harmonic, HarmonicMotion, InvalidValue, Scenario, ScenarioDistribution, Sensors, Winch
+from aframe_env import (
+    Crane,
+    Harmonic,
+    HarmonicMotion,
+    InvalidValue,
+    Scenario,
+    ScenarioDistribution,
+    Sea,
+    SeaMotion,
+    Sensors,
+    TorqueDrive,
+    Winch,
+)
 from aframe_env.task import SENSED, STATE
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.feedback import Feedback
@@ -296,3 +308,31 @@ def test_bad_input_is_refused():
         Gains(effort=1.0, share=2.0)
     with pytest.raises(InvalidValue, match="the policy reads 14"):
         run(Feedback(None), held_out_scenarios(ScenarioDistribution(), 1), observation="sensors")
+
+
+@pytest.mark.parametrize(
+    ("policy", "most"),
+    [
+        (Feedback(None), 0.012),
+        (PredictiveControl(PlanningConfig(sensors=None)), 0.006),
+        (Feedback(Sensors()), 0.04),
+        (PredictiveControl(PlanningConfig(sensors=Sensors())), 0.03),
+        (InverseDynamics(), 0.011),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_laws_take_a_drum_with_inertia_as_it_is(policy, most):
+    """Of the metre by which the load moves with the drum still."""
+    sea = SeaMotion(sea=Sea(hs=2.0, tp=8.0, heading=2.5, seed=0))
+    driven, told = (
+        Scenario(crane=Crane(winch=Winch(drive=drive)), motion=sea, ramp=10.0, rope_damping=3e4)
+        for drive in (TorqueDrive(), None)
+    )
+    observation = "state" if policy.name.endswith("(state)") or policy.name == "inverse dynamics" else "sensors"
+    with_drive = run(policy, [driven], observation=observation).rms[0]
+    assert run(policy, [told], observation=observation).rms[0] < with_drive < most
+
+
+def test_drives_are_not_optimised_for_a_drum_with_inertia():
+    with pytest.raises(InvalidValue, match="drive = TorqueDrive"):
+        Objective(sinusoid(crane=Crane(winch=Winch(drive=TorqueDrive()))), 10.0)
