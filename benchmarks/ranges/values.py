@@ -20,14 +20,17 @@ from aframe_env import (
     Crane,
     InvalidValue,
     LoadShape,
+    Luffing,
     Scenario,
     ScenarioDistribution,
     Seabed,
     Sensors,
     TargetPath,
+    Told,
     TorqueDrive,
     Water,
 )
+from aframe_env.scenario.luffing import STEEPEST
 from aframe_env.scenario.motion import COORDINATES, Harmonic, HarmonicMotion, ShipMotion
 from aframe_env.scenario.scenario import INITIALS
 from aframe_env.scenario.sea import SPECTRA, Sea, SeaMotion
@@ -167,6 +170,15 @@ def target_paths(draw: st.DrawFn) -> TargetPath:
 
 
 @st.composite
+def luffings(draw: st.DrawFn, start: float) -> Luffing:
+    """Swings of a frame from the angle ``start``, rad, slow and fast."""
+    times = sorted(draw(st.lists(st.floats(0.0, 60.0), min_size=2, max_size=4, unique=True)))
+    angles = [start, *(draw(st.floats(-STEEPEST, STEEPEST)) for _ in times[1:])]
+    points = tuple(zip(times, angles, strict=True))
+    return made(lambda: Luffing(points=points, max_speed=10.0, max_acceleration=100.0))
+
+
+@st.composite
 def scenarios(draw: st.DrawFn) -> Scenario:
     """Scenarios from all over the ranges."""
     crane, motion = draw(cranes()), draw(motions())
@@ -187,6 +199,10 @@ def scenarios(draw: st.DrawFn) -> Scenario:
         changes |= draw(waters())
     if draw(st.booleans()):
         changes["target_path"] = draw(target_paths())
+    if draw(st.booleans()):
+        changes["luffing"] = draw(luffings(crane.frame.luffing_angle))
+    if draw(st.booleans()):
+        changes["told"] = Told(load_mass=draw(ranges["load_mass"].values), lag=draw(st.floats(0.0, 1.0)))
     scenario: Scenario = made(lambda: replace(start, **changes))
     return scenario
 
