@@ -151,8 +151,8 @@ class ScenarioDistribution:
         require_instance("load", self.load, LoadShape)
         if self.target_path is not None:
             require_instance("target_path", self.target_path, TargetPath)
-        self._require_water()
         self._require_crane_and_told()
+        self._require_water()
         self._require_records()
         self._require_rope()
         # The corners of the distribution must be scenarios: refuse now rather than in the middle of a run.

@@ -74,17 +74,46 @@ struct Parameters {
 };
 
 template <typename Real>
-INLINE Vector<Real> acceleration(Vector<Real> x, Vector<Real> v, const Pulley<Real>& pulley, const Rope<Real>& rope,
-                                 const Parameters<Real>& p, Real& force) {
+struct Pull {
+    Real force;  // negative where the rope is slack
+    Vector<Real> towards;
+    Real nearness;
+};
+
+template <typename Real>
+INLINE Pull<Real> rope_pull(Vector<Real> x, Vector<Real> v, const Pulley<Real>& pulley, const Rope<Real>& rope,
+                            const Parameters<Real>& p) {
     const Vector<Real> u = along(pulley.position, Real(-1), x);
     const Vector<Real> du = along(pulley.velocity, Real(-1), v);
     const Real square = u.x * u.x + u.y * u.y + u.z * u.z + Real(1e-18);
     const Real inverse = Real(1) / std::sqrt(square);
     const Real rate = (u.x * du.x + u.y * du.y + u.z * du.z) * inverse;
     const Real pull = rope.stiffness * (square * inverse + p.to_pulley - rope.length) + p.damping * (rate - rope.rate);
-    force = pull > Real(0) ? pull : Real(0);
-    const Real share = force * inverse * p.inverse_mass;
-    return {share * u.x, share * u.y, share * u.z - p.gravity};
+    return {pull, u, inverse};
+}
+
+template <typename Real>
+INLINE Vector<Real> acceleration(Real force, const Pull<Real>& pull, const Parameters<Real>& p) {
+    const Real share = force * pull.nearness * p.inverse_mass;
+    return {share * pull.towards.x, share * pull.towards.y, share * pull.towards.z - p.gravity};
+}
+
+template <typename Real>
+INLINE Real taut(Real pull) {
+    return pull > Real(0) ? pull : Real(0);
+}
+
+// The tension of the last stage; where the rope goes slack or comes taut within the step, the one by which the weights
+// find the impulse of the taut part, the pull on a parabola.
+template <typename Real>
+INLINE Real last_tension(Real pull1, Real pull2, Real pull3, Real pull4) {
+    const Real most = pull1 > pull4 ? pull1 : pull4, least = pull1 > pull4 ? pull4 : pull1;
+    const bool corner = most * least < Real(0);
+    const Real share = most / (corner ? most - least : Real(1));
+    const Real bend = Real(2) * (pull1 + pull4 - pull2 - pull3);
+    const Real impulse = taut(share * (bend * share * (share / Real(3) - Real(0.5)) + Real(0.5) * most));
+    const Real earlier = Real(2) * (taut(pull2) + taut(pull3)) + taut(pull1);
+    return corner ? Real(6) * impulse - earlier : taut(pull4);
 }
 
 template <typename Real>
@@ -177,8 +206,10 @@ void control_step(Real* __restrict row, const Real* __restrict commands, int sub
             const Drum<Real> drum2 = drum_at(middle, start, command[j], slope[j], ramp_time[j]);
             const Drum<Real> drum3 = drum_at(end, start, command[j], slope[j], ramp_time[j]);
             const Rope<Real> rope1{length[j], rate[j], stiffness[j]};
-            const Rope<Real> rope2 = rope_on(drum2, free_length, radius, axial_stiffness);
+            Rope<Real> rope2 = rope_on(drum2, free_length, radius, axial_stiffness);
             const Rope<Real> rope3 = rope_on(drum3, free_length, radius, axial_stiffness);
+            // The speed from which Simpson's rule finds the drum's turn, though a ramp end inside the step.
+            rope2.rate = Real(1.5) / h * (rope3.length - length[j]) - Real(0.25) * (rate[j] + rope3.rate);
             const Pulley<Real> s1{{tip[0][j], tip[1][j], tip[2][j]}, {tip[3][j], tip[4][j], tip[5][j]}};
             const Pulley<Real> s2 = pulley_at(row + PATH * LANES, j, middle);
             const Pulley<Real> s3 = pulley_at(row + PATH * LANES, j, end);
@@ -186,14 +217,18 @@ void control_step(Real* __restrict row, const Real* __restrict commands, int sub
                                   row[(LOAD_POSITION + 2) * LANES + j]};
             const Vector<Real> v1{row[LOAD_VELOCITY * LANES + j], row[(LOAD_VELOCITY + 1) * LANES + j],
                                   row[(LOAD_VELOCITY + 2) * LANES + j]};
-            Real force1, force2, force3, force4;
-            const Vector<Real> a1 = acceleration(x1, v1, s1, rope1, p, force1);
+            const Pull<Real> pull1 = rope_pull(x1, v1, s1, rope1, p);
+            const Vector<Real> a1 = acceleration(taut(pull1.force), pull1, p);
             const Vector<Real> x2 = along(x1, half, v1), v2 = along(v1, half, a1);
-            const Vector<Real> a2 = acceleration(x2, v2, s2, rope2, p, force2);
+            const Pull<Real> pull2 = rope_pull(x2, v2, s2, rope2, p);
+            const Vector<Real> a2 = acceleration(taut(pull2.force), pull2, p);
             const Vector<Real> x3 = along(x1, half, v2), v3 = along(v1, half, a2);
-            const Vector<Real> a3 = acceleration(x3, v3, s2, rope2, p, force3);
+            const Pull<Real> pull3 = rope_pull(x3, v3, s2, rope2, p);
+            const Vector<Real> a3 = acceleration(taut(pull3.force), pull3, p);
             const Vector<Real> x4 = along(x1, h, v3), v4 = along(v1, h, a3);
-            const Vector<Real> a4 = acceleration(x4, v4, s3, rope3, p, force4);
+            const Pull<Real> pull4 = rope_pull(x4, v4, s3, rope3, p);
+            const Real last = last_tension(pull1.force, pull2.force, pull3.force, pull4.force);
+            const Vector<Real> a4 = acceleration(last, pull4, p);
             const Vector<Real> x = along(x1, sixth, weighted(v1, v2, v3, v4));
             const Vector<Real> v = along(v1, sixth, weighted(a1, a2, a3, a4));
             row[LOAD_POSITION * LANES + j] = x.x;
@@ -207,7 +242,8 @@ void control_step(Real* __restrict row, const Real* __restrict commands, int sub
             row[OMEGA1 * LANES + j] += sixth * (e1 * e1 + 2 * (e2 * e2 + e3 * e3) + e4 * e4);
             row[OMEGA2 * LANES + j] = greater(std::fabs(x.z - target), row[OMEGA2 * LANES + j]);
             row[PEAK_TENSION * LANES + j] =
-                greater(greater(greater(force1, force2), greater(force3, force4)), row[PEAK_TENSION * LANES + j]);
+                greater(greater(greater(pull1.force, pull2.force), greater(pull3.force, pull4.force)),
+                        row[PEAK_TENSION * LANES + j]);
             row[DRUM_ANGLE * LANES + j] = drum3.angle;
             row[DRUM_SPEED * LANES + j] = drum3.speed;
             length[j] = rope3.length;

@@ -21,7 +21,8 @@ import agents
 from aframe_env import InvalidValue, Scenario, ScenarioDistribution
 from aframe_env.scenario.crane import Crane, Rope, Winch
 from agents.learned.agent import LearnedPolicy
-from agents.rollout import held_out_scenarios
+from agents.policy import DrumStill
+from agents.rollout import held_out_scenarios, run
 from train.export import __main__ as command
 from train.export.check import Lifts, check
 from train.export.interface import crane_values, readings_of, told_of
@@ -61,10 +62,13 @@ def first_rows(exported: Exported, count: int) -> tuple[np.ndarray, np.ndarray, 
 
 
 def test_a_model_commands_what_python_does(exported: Exported) -> None:
-    agreement = check(exported.agent, exported.model, held_out_scenarios(ScenarioDistribution(), 2))
+    scenarios = held_out_scenarios(ScenarioDistribution(), 2)
+    agreement = check(exported.agent, exported.model, scenarios)
     assert agreement.drum_speed.shape == (600, 2)
     assert agreement.drum_speed.max() < 1e-8
-    np.testing.assert_allclose(agreement.rms, agreement.rms_python, rtol=0.05)
+    # Loops that differ by the network's rounding part a little where the sea is calm: held to what there is to hold.
+    still = run(DrumStill(), scenarios, observation="state").rms
+    assert (np.abs(agreement.rms - agreement.rms_python) < 0.01 * still).all()
 
 
 def test_a_model_is_told_the_crane(exported: Exported) -> None:
