@@ -37,6 +37,7 @@ from agents.drives.policy import DrivePolicy
 from agents.drives.realtime_map import RealTimeMapPolicy
 from agents.drives.tuned import TUNED, Tuned, optimised, optimised_as_played
 from agents.learned import agent as learned
+from agents.learned import recurrent
 from agents.learned.features import FeatureConfig
 from agents.policy import DrumStill, FloatArray, Knowledge, Policy
 
@@ -179,6 +180,10 @@ def _agent(folder: Path) -> PolicySpec:
     return as_spec(learned.load(folder))
 
 
+def _recurrent_agent(folder: Path) -> PolicySpec:
+    return as_spec(recurrent.load(folder))
+
+
 def _map_in_real_time(folder: Path) -> PolicySpec:
     stored = drive_map.load(folder)
     return _law(lambda sensors, waves: RealTimeMapPolicy(stored, sensors, waves))
@@ -196,6 +201,7 @@ def _map_by_the_clock(folder: Path) -> PolicySpec:
 
 FOLDERS: Final[dict[str, dict[str, Callable[[Path], PolicySpec]]]] = {
     learned.CARD: {"": _agent},
+    recurrent.CARD: {"": _recurrent_agent},
     drive_map.CARD: {"": _map_in_real_time, "state": _map_on_the_state, "clock": _map_by_the_clock},
 }
 """Loaders of policies from a folder, by the file that it must have, then by the word after a colon behind its path."""
@@ -261,6 +267,8 @@ def as_spec(policy: Policy) -> PolicySpec:
     period, digest = None, ""
     if isinstance(policy, learned.LearnedPolicy):
         period, digest = policy.card.control_period, learned.digest(learned.card_text(policy.card).encode())
+    elif isinstance(policy, recurrent.RecurrentPolicy):
+        period, digest = policy.card.control_period, learned.digest(recurrent.card_text(policy.card).encode())
     return PolicySpec(policy.name, lambda context: policy, control_period=period, digest=digest)
 
 
@@ -282,8 +290,8 @@ def _digest(file: Path) -> str:
 def _from_folder(folder: Path) -> PolicySpec:
     if _kinds_in(folder):
         return _of_folder(folder, "")
-    if learned.seeds(folder):
-        return as_spec(learned.load(folder))
+    if numbered := learned.seeds(folder):
+        return _from_folder(numbered[0])
     raise InvalidValue(f"policy = {str(folder)!r}: no agent in this folder: it has none of {', '.join(FOLDERS)}")
 
 

@@ -23,6 +23,7 @@ from agents.control.interior_point import BoundedTracking
 from agents.control.lift import Lift
 from agents.control.observer import observer_for
 from agents.control.regulator import QUICKEST, Columns, HoistBatch, Observation
+from agents.control.rope import RopeModel
 from agents.policy import FloatArray, Knowledge
 
 STATE_EFFORT = 0.0094
@@ -179,47 +180,86 @@ class Planner:
 
         They must be rows of one effort.
         """
-        inputs, speed = self._nominal(z, pulley, drum_speed)
-        model, winch = self._observer.model.some(rows), self.hoists.winch
-        count, horizon = speed[rows].shape
-        free = np.empty((horizon, count, 4))
-        state = z[rows]
-        for k in range(horizon):
-            state = free[k] = model.advance(state, np.zeros(count))
-        return BoundedTracking(
-            a=model.a,
-            b=np.repeat(model.b[:, None], horizon, axis=1),
-            middle=np.zeros((count, 4)),
-            middle_input=np.zeros((count, horizon)),
-            error=np.ascontiguousarray(free[:, :, 0].T),
-            error_middle=np.zeros((count, horizon)),
-            weights=(1.0, 0.0, float(self._efforts[rows][0])),
-            inputs=inputs[rows],
-            state=speed[rows],
-            input_limit=self._gain(horizon)[rows],
-            state_limit=(winch.radius * winch.max_speed)[rows],
-            last_state=free[-1],
-            # The error at the horizon's end is among those of the steps already.
-            cost_to_go=self._cost_to_go[rows] - np.diag([1.0, 0.0, 0.0, 0.0]),
+        winch = self.hoists.winch
+        return bounded_problem(
+            self._observer.model.some(rows),
+            z[rows],
+            pulley[rows],
+            (winch.radius * drum_speed)[rows],
+            change_limit=(self.period * winch.radius * winch.max_acceleration)[rows],
+            speed_limit=(winch.radius * winch.max_speed)[rows],
+            effort=float(self._efforts[rows][0]),
+            cost_to_go=self._cost_to_go[rows],
         )
 
     def _nominal(self, z: FloatArray, pulley: FloatArray, drum_speed: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Changes of the drum's speed and its speeds, both (N, H) m/s upwards, as long as the rope's end keeps its."""
-        # The drum's mean speed in a control step is the pulley's less the rope end's.
-        inputs = -np.diff(pulley, axis=1, prepend=0.0)
-        inputs[:, 0] += z[:, 3] + self.hoists.winch.radius * drum_speed
-        return inputs, z[:, 3:] - pulley
+        return nominal(z, pulley, self.hoists.winch.radius * drum_speed)
 
     def _gain(self, horizon: int) -> FloatArray:
-        """Speed (N, H) m/s that the drums can gain.
-
-        From its speed now a drum's mean speed in a step can come by half of what it can gain in a whole step, and from
-        step to step by all of it.
-        """
         winch = self.hoists.winch
-        gain = np.repeat((self.period * winch.radius * winch.max_acceleration)[:, None], horizon, axis=1)
-        gain[:, 0] *= 0.5
-        return gain
+        return gains_of_speed(self.period * winch.radius * winch.max_acceleration, horizon)
+
+
+def nominal(z: FloatArray, pulley: FloatArray, rope_speed: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Changes of the drum's speed and its speeds, both (N, H) m/s upwards, as long as the rope's end keeps its.
+
+    ``rope_speed`` (N,) m/s at which the drum pays out now.
+    """
+    # The drum's mean speed in a control step is the pulley's less the rope end's.
+    inputs = -np.diff(pulley, axis=1, prepend=0.0)
+    inputs[:, 0] += z[:, 3] + rope_speed
+    return inputs, z[:, 3:] - pulley
+
+
+def gains_of_speed(change_limit: FloatArray, horizon: int) -> FloatArray:
+    """Speed (N, H) m/s that drums can gain, that of their ropes changing by ``change_limit`` (N,) m/s in a step.
+
+    From its speed now a drum's mean speed in a step can come by half of what it can gain in a whole step, and from
+    step to step by all of it.
+    """
+    gain = np.repeat(change_limit[:, None], horizon, axis=1)
+    gain[:, 0] *= 0.5
+    return gain
+
+
+def bounded_problem(
+    model: RopeModel,
+    z: FloatArray,
+    pulley: FloatArray,
+    rope_speed: FloatArray,
+    *,
+    change_limit: FloatArray,
+    speed_limit: FloatArray,
+    effort: float,
+    cost_to_go: FloatArray,
+) -> BoundedTracking:
+    """The problem of N hoists over H steps, in changes (N, H) m/s of the rope end's speed.
+
+    ``z`` (N, 4): state of the rope's model; ``pulley`` (N, H) mean speeds to come, m/s; ``rope_speed``,
+    ``change_limit`` (in a step) and ``speed_limit``: (N,) m/s at the drum; ``cost_to_go`` (N, 4, 4) at the end.
+    """
+    inputs, speed = nominal(z, pulley, rope_speed)
+    count, horizon = speed.shape
+    free = np.empty((horizon, count, 4))
+    state = z
+    for k in range(horizon):
+        state = free[k] = model.advance(state, np.zeros(count))
+    return BoundedTracking(
+        a=model.a,
+        b=np.repeat(model.b[:, None], horizon, axis=1),
+        middle=np.zeros((count, 4)),
+        middle_input=np.zeros((count, horizon)),
+        error=np.ascontiguousarray(free[:, :, 0].T),
+        error_middle=np.zeros((count, horizon)),
+        weights=(1.0, 0.0, effort),
+        inputs=inputs,
+        state=speed,
+        input_limit=gains_of_speed(change_limit, horizon),
+        state_limit=speed_limit,
+        last_state=free[-1],
+        # The error at the horizon's end is among those of the steps already.
+        cost_to_go=cost_to_go - np.diag([1.0, 0.0, 0.0, 0.0]),
+    )
 
 
 class PredictiveControl:

@@ -25,8 +25,11 @@ class RopeModel:
     """(N, 4)."""
 
     @classmethod
-    def of(cls, frequency: FloatArray, damping_ratio: float, period: float) -> RopeModel:
-        """Model of loads that bob on their ropes at ``frequency`` (N,) rad/s, sampled every ``period`` s."""
+    def of(cls, frequency: FloatArray, damping_ratio: float | FloatArray, period: float) -> RopeModel:
+        """Model of loads that bob on their ropes at ``frequency`` (N,) rad/s, sampled every ``period`` s.
+
+        ``damping_ratio``: share of critical, one for all or (N,).
+        """
         rate = np.zeros((len(frequency), 4, 4))
         rate[:, 0, 1] = 1.0
         rate[:, 1, 0] = -(frequency**2)

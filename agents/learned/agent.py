@@ -125,8 +125,12 @@ def digest(weights: bytes) -> str:
 
 def card_text(card: AgentCard) -> str:
     """The card as JSON with its digest, lists of numbers on a line each."""
-    text = json.dumps(cards.sealed(asdict(card)), indent=2, ensure_ascii=False)
-    return re.sub(r"\[[^\[\]\"{}]*\]", lambda numbers: f"[{' '.join(numbers[0][1:-1].split())}]", text) + "\n"
+    return one_line_lists(json.dumps(cards.sealed(asdict(card)), indent=2, ensure_ascii=False)) + "\n"
+
+
+def one_line_lists(text: str) -> str:
+    """Indented JSON with lists of numbers on a line each."""
+    return re.sub(r"\[[^\[\]\"{}]*\]", lambda numbers: f"[{' '.join(numbers[0][1:-1].split())}]", text)
 
 
 def seeds(folder: str | Path) -> list[Path]:

@@ -1,0 +1,139 @@
+"""The recurrent agents' network: what it remembers of the waves, and what it does about the load."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import torch
+from torch import nn
+
+from agents.learned.recurrent_inputs import FIGURES, FORECASTS
+
+LOAD_FEATURES = 10
+
+
+class OneSided(torch.autograd.Function):
+    """Clip to ± a limit; where that bites, only a gradient that leads back inside comes through.
+
+    Plain clipping lets none through, so that who asks for more than there is never learns to ask for less.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, value: torch.Tensor, limit: torch.Tensor) -> torch.Tensor:
+        """``value`` within ± ``limit``, of one shape."""
+        ctx.save_for_backward(value, limit)
+        return torch.maximum(torch.minimum(value, limit), -limit)
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: torch.Tensor) -> tuple[torch.Tensor, None]:
+        """Descent goes against the gradient: beyond the upper limit it must be positive."""
+        value, limit = ctx.saved_tensors
+        (gradient,) = gradients
+        outwards = ((value > limit) & (gradient < 0.0)) | ((value < -limit) & (gradient > 0.0))
+        return torch.where(outwards, torch.zeros_like(gradient), gradient), None
+
+
+def clip_one_sided(value: torch.Tensor, limit: torch.Tensor) -> torch.Tensor:
+    """Clip ``value`` to ± ``limit``, with ``OneSided`` gradients."""
+    clipped: torch.Tensor = OneSided.apply(value, limit)  # type: ignore[no-untyped-call]
+    return clipped
+
+
+class Load(NamedTuple):
+    """Load, drum and winch of B lifts, as the network sees them: tensors (B,) or (B, 4)."""
+
+    z: torch.Tensor
+    """(B, 4) estimated state of ``RopeModel``."""
+    rise: torch.Tensor
+    """Foretold mean speed of the pulley over the coming control step, m/s."""
+    speed: torch.Tensor
+    """Of the rope at the drum, paid out, m/s."""
+    gains: torch.Tensor
+    """(B, 4) of the regulator."""
+    most_change: torch.Tensor
+    """Greatest change of the rope's speed in a control step, m/s."""
+    most_speed: torch.Tensor
+    """m/s."""
+
+
+class RecurrentNetwork(nn.Module):
+    """A GRU on the series of an ``Outlook``, and a perceptron on what it remembers and on the load.
+
+    The perceptron's three outputs weigh the regulator, correct the speed that is aimed at, and push the drum directly;
+    while they are small the whole is nearly the regulator above a feed-forward of the pulley.
+    """
+
+    def __init__(self, readings: int, memory: int = 96, hidden: int = 128) -> None:
+        """``readings``: numbers of the series beside the forecasts and the surprise."""
+        super().__init__()
+        self.memory_size, self.hidden_size = memory, hidden
+        self.gru = nn.GRU(FORECASTS + readings + 1 + len(FIGURES), memory, batch_first=True)
+        self.forecast = nn.Linear(memory, FORECASTS)
+        self.of_context = nn.Linear(memory + FORECASTS + len(FIGURES), hidden)
+        self.of_load = nn.Linear(LOAD_FEATURES, hidden, bias=False)
+        self.second = nn.Linear(hidden, hidden)
+        self.last = nn.Linear(hidden, 3)
+        with torch.no_grad():
+            self.forecast.weight.zero_()
+            self.forecast.bias.zero_()
+            self.last.weight.mul_(0.1)
+            self.last.bias.zero_()
+
+    def remember(
+        self, series: torch.Tensor, figures: torch.Tensor, memory: torch.Tensor | None = None
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Take series (B, n, S) of lifts with these figures (B, F).
+
+        Return contexts (B, n, C), memory and corrected forecasts in the first places, and the memory for what follows.
+        """
+        told = figures[:, None].expand(-1, series.shape[1], -1)
+        seen, last = self.gru(torch.cat([series, told], dim=-1), memory)
+        forecast = series[..., :FORECASTS] + self.forecast(seen)
+        return torch.cat([seen, forecast, told], dim=-1), last
+
+    def forecasts(self, context: torch.Tensor) -> torch.Tensor:
+        """Corrected forecasts (…, FORECASTS) in contexts (…, C): heave rates, then rises."""
+        return context[..., self.memory_size : self.memory_size + FORECASTS]
+
+    def prepare(self, context: torch.Tensor) -> torch.Tensor:
+        """The part of the perceptron's first layer (…, H) that does not wait for the load."""
+        prepared: torch.Tensor = self.of_context(context)
+        return prepared
+
+    def share(self, prepared: torch.Tensor, load: Load) -> torch.Tensor:
+        """Change of the rope's speed (B,) over the coming step, as a share of what the winch can; not clipped yet."""
+        z, change = load.z, load.most_change
+        p = z[..., 3] - (load.gains * z).sum(-1)
+        following, regulated = (load.rise - load.speed) / change, (load.rise - p - load.speed) / change
+        of_load = torch.stack(
+            [
+                4.0 * torch.tanh(0.5 * z[..., 0]),
+                2.0 * torch.tanh(10.0 * z[..., 0]),
+                3.0 * z[..., 1],
+                10.0 * (z[..., 2] - z[..., 0]),
+                2.0 * z[..., 3],
+                load.speed,
+                load.speed / load.most_speed,
+                following.clamp(-4.0, 4.0),
+                regulated.clamp(-4.0, 4.0),
+                3.0 * p.clamp(-1.0, 1.0),
+            ],
+            dim=-1,
+        )
+        hidden = nn.functional.silu(prepared + self.of_load(of_load))
+        weight, correction, push = self.last(nn.functional.silu(self.second(hidden))).unbind(-1)
+        goal = load.rise - torch.sigmoid(weight + 1.0) * p.clamp(-0.5, 0.5) - 0.5 * correction
+        share: torch.Tensor = change_for((goal - load.speed) / change) + 2.0 * push
+        return share
+
+
+def change_for(mean: torch.Tensor) -> torch.Tensor:
+    """Change of a drum's speed over a step after which its mean speed lies ``mean`` above that at the start.
+
+    Both as shares of what the winch can change in a step: it ramps up at once and then holds, 2 |x| = 1 - (1 - y)².
+    Beyond what can be reached it goes on linearly, to 1.3 at the most.
+    """
+    twice = 2.0 * mean.abs()
+    within = 1.0 - torch.sqrt((1.0 - twice).clamp(min=0.04))
+    beyond = (0.8 + 2.5 * (twice - 0.96)).clamp(max=1.3)
+    return torch.where(twice < 0.96, within, beyond) * mean.sign()

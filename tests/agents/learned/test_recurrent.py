@@ -1,0 +1,170 @@
+import json
+
+import numpy as np
+import pytest
+import torch
+
+from aframe_env import Crane, InvalidValue, ScenarioDistribution, Winch
+from aframe_env.scenario.sensors import Sensors
+from agents import cards
+from agents.control.expected_waves import ExpectedWaves
+from agents.control.winch import WinchModel
+from agents.learned.agent import digest
+from agents.learned.recurrent import CARD, WEIGHTS, RecurrentCard, RecurrentPolicy, card_text, load, serialise
+from agents.learned.recurrent_inputs import Lookout, LookoutConfig
+from agents.learned.recurrent_network import change_for, clip_one_sided
+from agents.policy import Knowledge
+from agents.registry import choose_all
+from agents.rollout import held_out_scenarios, run
+
+WAVES = ExpectedWaves(frequency=(0.5, 0.7, 0.9, 1.2), variances=((0.05, 0.1, 0.1, 0.05),), build_up=5.0)
+SEAS = ScenarioDistribution(max_rope_speed=(1.5, 2.5), max_rope_acceleration=(1.0, 2.0))
+
+
+def agent(observation="sensors", seed=1):
+    sensors = None if observation == "state" else Sensors()
+    card = RecurrentCard(
+        algorithm="recurrent APG",
+        observation=observation,
+        sensors=sensors,
+        waves=WAVES,
+        memory=8,
+        hidden=16,
+        control_period=0.1,
+        task="AFrameHeave-Storm-v0",
+        seed=seed,
+        versions={"torch": "2"},
+        sha256="",
+    )
+    torch.manual_seed(seed)
+    network = card.network()
+    with torch.no_grad():
+        for parameter in network.parameters():  # far from the regulator that a fresh one is
+            parameter.add_(0.2 * torch.randn_like(parameter))
+    weights = serialise(network)
+    card = RecurrentCard(**{**vars(card), "sha256": digest(weights)})
+    return RecurrentPolicy(network, card), weights
+
+
+def write(folder, policy, weights, **changes):
+    folder.mkdir(exist_ok=True)
+    (folder / WEIGHTS).write_bytes(weights)
+    card = json.loads(card_text(policy.card))
+    del card[cards.DIGEST]
+    (folder / CARD).write_text(json.dumps(cards.sealed({**card, **changes})))
+
+
+def play(policy, scenarios, **arguments):
+    observation = "state" if policy.knows is Knowledge.STATE else "sensors"
+    return run(policy, scenarios, episode_duration=4.0, observation=observation, **arguments)
+
+
+@pytest.mark.parametrize("observation", ["state", "sensors"])
+def test_an_agent_comes_back_from_its_folder_to_the_bit(observation, tmp_path):
+    policy, weights = agent(observation)
+    write(tmp_path, policy, weights)
+    again = load(tmp_path)
+    assert again.card == policy.card
+    assert (again.name, again.knows) == (policy.name, policy.knows)
+    assert serialise(again.network) == weights
+    scenarios = held_out_scenarios(SEAS, 3)
+    one, other = play(policy, scenarios), play(again, scenarios)
+    assert np.array_equal(one.drum_speed, other.drum_speed)
+    assert np.ptp(one.drum_speed) > 0.1
+
+
+@pytest.mark.parametrize("observation", ["state", "sensors"])
+def test_a_row_does_not_depend_on_the_others(observation):
+    policy, _ = agent(observation)
+    scenarios = held_out_scenarios(SEAS, 70)  # more than a block
+    many = play(policy, scenarios)
+    for row in (0, 37, 66):
+        alone = play(policy, scenarios[row : row + 1], first=row)
+        assert np.array_equal(alone.drum_speed[0], many.drum_speed[row])
+
+
+def test_a_new_episode_begins_with_a_fresh_memory():
+    policy, _ = agent()
+    scenarios = held_out_scenarios(SEAS, 2)
+    assert np.array_equal(play(policy, scenarios).drum_speed, play(policy, scenarios).drum_speed)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"sha256": "0" * 64}, "does not match the sha256"),
+        ({"format": 99}, "format = 99"),
+        ({"hidden": 17}, "not the weights of the network"),
+        ({"memory": "many"}, "memory"),
+    ],
+)
+def test_files_that_do_not_belong_together_are_refused(changes, words, tmp_path):
+    write(tmp_path, *agent(), **changes)
+    with pytest.raises(InvalidValue, match=words):
+        load(tmp_path)
+
+
+def test_an_altered_card_and_missing_weights_are_refused(tmp_path):
+    policy, weights = agent()
+    write(tmp_path, policy, weights)
+    (tmp_path / CARD).write_text((tmp_path / CARD).read_text().replace("Storm", "Calm"))
+    with pytest.raises(InvalidValue, match="does not match its own digest"):
+        load(tmp_path)
+    write(tmp_path, policy, weights)
+    (tmp_path / WEIGHTS).unlink()
+    with pytest.raises(InvalidValue, match="no agent in"):
+        load(tmp_path)
+
+
+def test_weights_that_are_no_numbers_and_another_period_are_refused():
+    policy, _ = agent()
+    with pytest.raises(InvalidValue, match=r"trained for 0\.1 s"):
+        policy.reset(held_out_scenarios(SEAS, 1), 0.2)
+    with torch.no_grad():
+        policy.network.last.bias[0] = torch.nan
+    with pytest.raises(InvalidValue, match="not finite"):
+        serialise(policy.network)
+    with pytest.raises(InvalidValue, match="not finite"):
+        play(policy, held_out_scenarios(SEAS, 1))
+
+
+def test_the_comparison_finds_it_by_its_folder_and_by_that_of_its_seeds(tmp_path):
+    for seed in (3, 12):
+        write(tmp_path / f"seed-{seed}", *agent(seed=seed))
+    one, other = choose_all([str(tmp_path)])
+    assert one.name.startswith("recurrent APG on sensors")
+    assert (one.control_period, other.control_period) == (0.1, 0.1)
+    assert one.digest != other.digest
+    (alone,) = choose_all([str(tmp_path / "seed-12")])
+    assert alone.digest == other.digest
+
+
+def test_a_share_asks_the_winch_for_that_much_more_speed():
+    scenario = held_out_scenarios(SEAS, 1)[0]
+    lookout = Lookout(3, LookoutConfig(waves=WAVES))
+    seen = np.zeros((3, 14), dtype=np.float32)
+    seen[:, 11:] = 5e5, 5e4, 500.0  # tension, mass, length
+    lookout.start(seen, [scenario] * 3)
+    winch = scenario.crane.winch
+    command = lookout.command(np.array([0.5, -7.0, 0.0]))
+    assert command == pytest.approx(np.array([0.5, -1.0, 0.0]) * 0.1 * winch.max_acceleration)
+    assert lookout.most_change[0] == pytest.approx(0.1 * winch.max_rope_acceleration)
+    assert lookout.most_speed[0] == pytest.approx(winch.max_rope_speed)
+
+
+def test_the_change_for_a_mean_speed_is_what_the_winch_model_makes_of_it():
+    # The mean speed over a step of a winch that is told its new speed, by the dynamics' own kernel.
+    share = np.linspace(-0.79, 0.79, 21)
+    winch = WinchModel(len(share), 0.1)
+    winch.start([Crane(winch=Winch(lag=0.0))] * len(share))
+    most = 0.1 * winch.max_acceleration
+    mean = winch.turn(share * most) / 0.1 / most
+    assert change_for(torch.from_numpy(mean)).numpy() == pytest.approx(share, abs=1e-9)
+
+
+def test_beyond_a_limit_only_gradients_that_lead_back_come_through():
+    value = torch.tensor([0.5, 2.0, 2.0, -2.0, -2.0], requires_grad=True)
+    clipped = clip_one_sided(value, torch.ones(5))
+    assert clipped.tolist() == [0.5, 1.0, 1.0, -1.0, -1.0]
+    clipped.backward(torch.tensor([-1.0, 1.0, -1.0, 1.0, -1.0]))
+    assert value.grad.tolist() == [-1.0, 1.0, 0.0, 0.0, -1.0]

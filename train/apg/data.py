@@ -1,0 +1,178 @@
+"""Recordings: episodes of the real engine, with what a recurrent agent would have seen in them, and what was true.
+
+The drum plays the optimum meanwhile. Readings, forecasts and the filters' errors hardly depend on what it does, so that
+they serve whatever a network does in their place (``train.apg.twin``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+import torch
+
+from aframe_env import task
+from aframe_env.config import TaskConfig
+from aframe_env.dynamics.start import critical_damping
+from aframe_env.scenario import Scenario
+from aframe_env.simulation import Simulation
+from aframe_env.validation import InvalidValue
+from agents.control.inverse_dynamics import RequiredRope
+from agents.control.optimum import optimise
+from agents.control.rope import RopeModel
+from agents.learned.recurrent_inputs import Lookout, LookoutConfig
+from agents.policy import DrumStill, FloatArray
+from agents.rollout import run
+
+PREVIEW: Final = 90
+"""Control steps beyond an episode's end that the pulley's path is recorded for: what the teacher sees ahead."""
+OPTIMUM_ROUNDS: Final = 8
+"""Gauss-Newton steps of the optimum: what further ones gain is of no account here."""
+LEAST_CEILING: Final = 0.3
+"""Heave reduction of the optimum below which an episode is left out: nothing is to be learned from it."""
+GREATEST_ERROR: Final = 0.6
+"""Error of an estimate, m or m/s, beyond which an episode is: its rope went slack."""
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """N episodes of n control steps."""
+
+    period: float
+    """Control step, s."""
+    series: Array
+    """(N, n, S) of ``Outlook``."""
+    figures: Array
+    """(N, F) ``FIGURES``."""
+    gains: Array
+    """(N, 4) of the regulator."""
+    told_change: Array
+    """(N,) greatest change of the rope's speed at the drum in a step, as told, m/s."""
+    told_speed: Array
+    """(N,) greatest speed of the rope at the drum, as told, m/s."""
+    error: Array
+    """(N, n, 4) estimated less true state of ``RopeModel``."""
+    rise: Array
+    """(N, n) foretold mean speed of the pulley over the coming step, m/s."""
+    path: Array
+    """(N, n + 1 + PREVIEW) length of rope since the start that would hold the load still, m."""
+    path_speed: Array
+    """(N, n + 1 + PREVIEW) its rate, m/s."""
+    frequency: Array
+    """(N,) of the load's bobbing, rad/s."""
+    damping: Array
+    """(N,) of it, share of critical."""
+    most_change: Array
+    """(N,) what is true of ``told_change``."""
+    most_speed: Array
+    """(N,) and of ``told_speed``."""
+    still: Array
+    """(N,) root mean square depth error with the drum left still, m."""
+    best: Array
+    """(N,) and with the best drum commands."""
+
+    def rows(self, which: npt.NDArray[np.int64] | slice) -> Recordings:
+        """Some of the episodes."""
+        return Recordings(self.period, **{name: array[which] for name, array in self.arrays().items()})
+
+    def arrays(self) -> dict[str, Array]:
+        """All but the period, by name."""
+        return {each.name: getattr(self, each.name) for each in fields(self) if each.name != "period"}
+
+    @classmethod
+    def joined(cls, parts: Sequence[Recordings]) -> Recordings:
+        """The episodes of all parts, one after the other."""
+        names = parts[0].arrays()
+        return cls(parts[0].period, **{name: np.concatenate([part.arrays()[name] for part in parts]) for name in names})
+
+    def model(self) -> RopeModel:
+        """True model of the loads on their ropes."""
+        return RopeModel.of(self.frequency, self.damping, self.period)
+
+    def shares(self, rms: torch.Tensor) -> torch.Tensor:
+        """Shares (N,) of the ceiling for depth errors (N,) m."""
+        still, best = (torch.from_numpy(each).to(rms.dtype) for each in (self.still, self.best))
+        return (still - rms) / (still - best)
+
+    def tensors(self) -> dict[str, torch.Tensor]:
+        """Arrays as tensors, and the ``transition`` of ``Twin``; of the series' precision."""
+        precision = torch.from_numpy(self.series).dtype
+        arrays = {**self.arrays(), "transition": self.model().a[:, :3]}
+        return {name: torch.from_numpy(np.ascontiguousarray(array)).to(precision) for name, array in arrays.items()}
+
+
+def require_linear(scenarios: Sequence[Scenario]) -> None:
+    """Raise unless the twin knows all of these lifts."""
+    for scenario in scenarios:
+        if not scenario.is_light:
+            raise InvalidValue("a heavy rope, water or a target that moves: the twin of train.apg knows none of them")
+        if scenario.crane.winch.lag:
+            raise InvalidValue(f"lag = {scenario.crane.winch.lag:g} s: must be 0 s for the twin of train.apg")
+
+
+def required_path(scenarios: Sequence[Scenario], period: float, steps: int) -> tuple[FloatArray, FloatArray]:
+    """Length of rope (N, steps + 1) m since the start that would hold the loads still, and its rate, m/s."""
+    rope = RequiredRope(scenarios, period)
+    half = np.empty((2 * steps + 2, len(scenarios)))
+    for i in range(len(half)):
+        half[i] = rope.now()
+        rope.advance()
+    rate = np.zeros((steps + 1, len(scenarios)))
+    rate[1:] = (half[3::2] - half[1:-1:2]) / period
+    return half[::2].T.copy(), rate.T.copy()
+
+
+def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Recordings:
+    """Record an episode of each scenario; ``seed`` of the sensors' noise. Those of no use are left out."""
+    require_linear(scenarios)
+    count, steps, period = len(scenarios), config.steps, config.control_period
+    optimum = optimise(scenarios, config, rounds=OPTIMUM_ROUNDS)
+    still = run(DrumStill(), scenarios, config)
+    path, path_speed = required_path(scenarios, period, steps + PREVIEW)
+    lookout = Lookout(count, LookoutConfig.of(config))
+    simulation = Simulation(count, config.replaced(scenario=scenarios[0], observation=config.sensors or "state"))
+    noise = np.random.default_rng(seed).integers(2**63, size=count).tolist()
+    simulation.reset_rows(np.arange(count), list(zip(scenarios, noise, strict=True)))
+    radius = np.array([scenario.crane.winch.drum_radius for scenario in scenarios])
+    series, error, rise = [], np.empty((count, steps, 4)), np.empty((count, steps))
+    for step in range(steps):
+        seen = simulation.observe()
+        outlook = lookout.advance(seen) if step else lookout.start(seen, [each.as_told for each in scenarios])
+        true = simulation.state
+        rope_end = path[:, step] - radius * true[:, task.DRUM_ANGLE]
+        rope_end_speed = path_speed[:, step] - radius * true[:, task.DRUM_SPEED]
+        z = [true[:, task.DEPTH_ERROR], true[:, task.LOAD_VELOCITY_Z], rope_end, rope_end_speed]
+        series.append(outlook.series)
+        error[:, step] = outlook.z - np.stack(z, axis=1)
+        rise[:, step] = outlook.rise
+        simulation.advance(lookout.follow(optimum.commands[:, step]))
+    best = np.sqrt(optimum.omega1 / config.duration)
+    winches = [scenario.crane.winch for scenario in scenarios]
+    recordings = Recordings(
+        period=period,
+        series=np.stack(series, axis=1),
+        figures=lookout.figures,
+        gains=lookout.gains,
+        told_change=lookout.most_change,
+        told_speed=lookout.most_speed,
+        error=error.astype(np.float32),
+        rise=rise.astype(np.float32),
+        path=path,
+        path_speed=path_speed.astype(np.float32),
+        frequency=np.array([scenario.rope_frequency for scenario in scenarios]),
+        damping=np.array(
+            [each.total_rope_damping / critical_damping(each.rope_stiffness, each.moved_mass) for each in scenarios]
+        ),
+        most_change=np.array([winch.max_rope_acceleration * period for winch in winches]),
+        most_speed=np.array([winch.max_rope_speed for winch in winches]),
+        still=still.rms,
+        best=best,
+    )
+    of_use = np.isfinite(best) & (best < (1.0 - LEAST_CEILING) * still.rms)
+    of_use &= abs(error).max(axis=(1, 2)) < GREATEST_ERROR
+    return recordings.rows(np.flatnonzero(of_use))

@@ -1,0 +1,55 @@
+"""The teacher: what the optimum would do next in the states that a network visits, the pulley's true way ahead known.
+
+The winch-limited optimum of the nine seconds to come, as predictive control plans it, but with what is true in the
+place of what is estimated and foretold.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from agents.control.predictive import bounded_problem
+from agents.policy import FloatArray
+from train.apg.data import PREVIEW, Recordings
+
+EFFORT: Final = 0.1
+"""Price of changes of the rope end's speed, s²: it keeps the plan from moves that the linear model alone likes."""
+
+
+class Teacher:
+    """What would be best in recorded episodes."""
+
+    def __init__(self, recordings: Recordings) -> None:
+        self._recordings = recordings
+        self._model = recordings.model()
+        self._cost_to_go = self._model.costs_to_go(np.full(len(recordings.still), EFFORT))
+
+    def share(
+        self, episode: npt.NDArray[np.int64], step: npt.NDArray[np.int64], z: FloatArray, speed: FloatArray
+    ) -> FloatArray:
+        """Change (M,) of the rope's speed over a step, as a share of what the winch can, from states that were visited.
+
+        ``episode`` and ``step`` (M,): where; ``z`` (M, 4) true states of ``RopeModel``, ``speed`` (M,) of the rope at
+        the drum, m/s. NaN where the problem has no answer.
+        """
+        r = self._recordings
+        ahead = step[:, None] + np.arange(PREVIEW + 1)
+        pulley = np.diff(r.path[episode[:, None], ahead], axis=1) / r.period
+        problem = bounded_problem(
+            self._model.some(episode),
+            z,
+            pulley,
+            speed,
+            change_limit=r.most_change[episode],
+            speed_limit=r.most_speed[episode],
+            effort=EFFORT,
+            cost_to_go=self._cost_to_go[episode],
+        )
+        first = problem.solve()[0][:, 0]
+        mean = pulley[:, 0] - z[:, 3] - first - speed
+        # The drum ramps up at once, and then holds: 2 |mean| = most (1 - (1 - share)²).
+        reached = np.clip(2.0 * mean / r.most_change[episode], -1.0, 1.0)
+        return np.asarray(np.sign(reached) * (1.0 - np.sqrt(1.0 - abs(reached))))
