@@ -12,6 +12,8 @@ from setuptools.command.build_py import build_py
 SHIPPED = (
     "agents/*/seed-0/agent.json",
     "agents/*/seed-0/agent.safetensors",
+    "agents/*/seed-0/recurrent.json",
+    "agents/*/seed-0/recurrent.safetensors",
     "drive-map/drive_map.json",
     "drive-map/drive_map.safetensors",
     "tasks/*/ceiling*.json",

@@ -14,6 +14,7 @@ from aframe_env.neighbours import PACKAGES, in_the_way
 COMMANDS: Final[Mapping[str, str]] = {
     "ppo": "train a PPO agent and compare it",
     "sac": "train a SAC agent and compare it",
+    "apg": "train a recurrent agent by the gradient of its score",
     "gpu-ppo": "train a PPO agent of rsl_rl on a GPU",
     "evaluate": "compare policies on held-out scenarios, and write the report",
     "benchmark": "score policies on the tasks of the suite",

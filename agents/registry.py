@@ -234,8 +234,9 @@ def choose(text: str) -> PolicySpec:
     module, colon, attribute = text.partition(":")
     if colon and module.replace(".", "").isidentifier() and attribute.isidentifier():
         return _from_module(text, module, attribute)
+    names = [*REGISTRY, *shipped.AGENTS, *shipped.RECURRENT, shipped.DRIVE_MAP]
     raise InvalidValue(
-        f"policy = {text!r}: must be one of {', '.join(map(repr, [*REGISTRY, *shipped.AGENTS, shipped.DRIVE_MAP]))}, "
+        f"policy = {text!r}: must be one of {', '.join(map(repr, names))}, "
         "the folder of an agent or a drive map, or module:function"
     )
 

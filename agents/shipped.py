@@ -9,8 +9,13 @@ _IN_A_WHEEL: Final = Path(__file__).parent / "data"
 _IN_A_CHECKOUT: Final = Path(__file__).parents[1] / "results"
 _ROOT: Final = _IN_A_WHEEL if _IN_A_WHEEL.is_dir() else _IN_A_CHECKOUT
 
-AGENTS: Final[dict[str, Path]] = {folder.name: folder for folder in sorted(_ROOT.glob("agents/*/"))}
-"""Folders of the agents. A wheel has one seed of each, a checkout all."""
+_FOLDERS: Final = sorted(_ROOT.glob("agents/*/"))
+RECURRENT: Final[dict[str, Path]] = {
+    folder.name: folder for folder in _FOLDERS if any(folder.glob("seed-*/recurrent.json"))
+}
+"""Folders of the recurrent agents. A wheel has one seed of each, a checkout all."""
+AGENTS: Final[dict[str, Path]] = {folder.name: folder for folder in _FOLDERS if folder.name not in RECURRENT}
+"""Folders of all others, the agents on features, likewise."""
 DRIVE_MAP: Final = "drive-map"
 
 
@@ -18,7 +23,7 @@ def folder(place: str | Path) -> Path:
     """Return the folder of what is shipped under a name, or else that path; "./ppo" is always a path."""
     if place == DRIVE_MAP:
         return _ROOT / DRIVE_MAP
-    return AGENTS.get(str(place), Path(place)) if isinstance(place, str) else place
+    return {**AGENTS, **RECURRENT}.get(place, Path(place)) if isinstance(place, str) else place
 
 
 def task_folder(name: str) -> Path:
