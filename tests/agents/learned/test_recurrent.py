@@ -1,17 +1,19 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
-from aframe_env import Crane, InvalidValue, ScenarioDistribution, Winch
+from aframe_env import Crane, InvalidValue, ScenarioDistribution, TaskConfig, Winch, task
 from aframe_env.scenario.sensors import Sensors
+from aframe_env.simulation import Simulation
 from agents import cards
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.winch import WinchModel
 from agents.learned.agent import digest
 from agents.learned.recurrent import CARD, WEIGHTS, RecurrentCard, RecurrentPolicy, card_text, load, serialise
-from agents.learned.recurrent_inputs import Lookout, LookoutConfig
+from agents.learned.recurrent_inputs import RATES_AHEAD, RISES_AHEAD, Lookout, LookoutConfig
 from agents.learned.recurrent_network import change_for, clip_one_sided
 from agents.policy import Knowledge
 from agents.registry import choose_all
@@ -168,3 +170,55 @@ def test_beyond_a_limit_only_gradients_that_lead_back_come_through():
     assert clipped.tolist() == [0.5, 1.0, 1.0, -1.0, -1.0]
     clipped.backward(torch.tensor([-1.0, 1.0, -1.0, 1.0, -1.0]))
     assert value.grad.tolist() == [-1.0, 1.0, 0.0, 0.0, -1.0]
+
+
+def test_forecasts_are_of_the_moments_that_they_are_said_to_be():
+    """With readings that are late by two control steps: a step earlier or later they would fit worse in every sea."""
+    sensors = replace(Sensors(), delay=0.2)
+    seas = replace(SEAS, hs=(2.0, 4.0))  # not so calm that noise is a good part of the motion
+    scenarios = held_out_scenarios(seas, 4)
+    config = LookoutConfig(sensors=sensors, waves=ExpectedWaves.of(seas))
+    simulation = Simulation(4, TaskConfig(scenario=scenarios[0], observation=sensors, episode_duration=60.0))
+    simulation.reset_rows(np.arange(4), [(scenario, 0) for scenario in scenarios])
+    lookout = Lookout(4, config)
+    speed, heave, outlooks = [], [], []
+    for step in range(600):
+        seen = simulation.observe()
+        outlooks.append(lookout.advance(seen) if step else lookout.start(seen, scenarios))
+        speed.append(simulation.state[:, task.PULLEY_VELOCITY_Z].copy())
+        heave.append(simulation.state[:, task.PULLEY_HEAVE].copy())
+        simulation.advance(lookout.command(np.full(4, 0.3 * np.sin(0.2 * step))))
+    series = np.array([each.series for each in outlooks])
+    speed, heave = np.array(speed), np.array(heave)
+    rate, rise = series[:, :, RATES_AHEAD.index(0.3)], series[:, :, len(RATES_AHEAD) + RISES_AHEAD.index(1.0)]
+    steps = np.arange(200, 560)
+
+    def missed(foretold, true, later):
+        """Root mean square of what is missed in each sea, as a share of the motion's, were it of a moment later."""
+        return np.std(foretold[steps] - true(steps + later), axis=0) / np.std(true(steps), axis=0)
+
+    soon = np.array([each.rise for each in outlooks])
+    for foretold, true, most in (
+        (rate, lambda at: speed[at + 3], 0.15),
+        (rise, lambda at: heave[at + 10] - heave[at], 0.15),
+        (soon, lambda at: (heave[at + 1] - heave[at]) / 0.1, 0.1),
+    ):
+        now = missed(foretold, true, 0)
+        assert now.max() < most
+        assert (now < missed(foretold, true, -1)).all()
+        assert (now < missed(foretold, true, 1)).all()
+
+
+def test_other_ropes_retune_it():
+    scenarios = held_out_scenarios(SEAS, 2)
+    seen = np.zeros((2, 14), dtype=np.float32)
+    seen[:, 11:] = 5e5, 5e4, 500.0  # tension, mass, length
+    lookout, longer = Lookout(2, LookoutConfig(waves=WAVES)), Lookout(2, LookoutConfig(waves=WAVES))
+    lookout.start(seen, scenarios)
+    before = lookout.gains
+    lookout.retune(np.full(2, 800.0), np.zeros(2))
+    seen[:, 13] = 800.0
+    longer.start(seen, scenarios)
+    assert lookout.gains == pytest.approx(longer.gains)
+    assert lookout.figures == pytest.approx(longer.figures, abs=1e-6)
+    assert abs(lookout.gains - before).max() > 1e-3
