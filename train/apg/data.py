@@ -113,6 +113,8 @@ def require_linear(scenarios: Sequence[Scenario]) -> None:
             raise InvalidValue("a heavy rope, water or a target that moves: the twin of train.apg knows none of them")
         if scenario.crane.winch.lag:
             raise InvalidValue(f"lag = {scenario.crane.winch.lag:g} s: must be 0 s for the twin of train.apg")
+        if scenario.as_told.crane.winch != scenario.crane.winch:
+            raise InvalidValue("a winch that is not as told: must be as told for the twin of train.apg")
 
 
 def required_path(scenarios: Sequence[Scenario], period: float, steps: int) -> tuple[FloatArray, FloatArray]:

@@ -41,8 +41,9 @@ class ApgOptions(RunOptions):
     forecaster_steps: int = 250
     """Steps of the forecaster's training, each on ``forecaster_batch`` episodes."""
     forecaster_batch: int = 64
+    """Episodes."""
     forecaster_rate: float = 2e-3
-    """Learning rate of the forecaster at the start; each stage's falls linearly to a thirtieth."""
+    """Learning rate of the forecaster at the start. Each of these rates falls linearly to a thirtieth in its stage."""
     rounds: int = 2
     """Rounds of imitation: the first in the states that the untrained network visits, which is a regulator, each
     further one (DAgger) in those that the network visits that was taught before."""
@@ -51,11 +52,15 @@ class ApgOptions(RunOptions):
     imitation_steps: int = 3000
     """Steps of each round, each on ``imitation_batch`` states of all rounds so far."""
     imitation_batch: int = 4096
+    """States."""
     imitation_rate: float = 1.5e-3
+    """Learning rate of each round at the start."""
     updates: int = 260
     """Steps along the gradient of the score through the twin, each on ``batch`` whole episodes."""
     batch: int = 128
+    """Episodes."""
     rate: float = 1e-3
+    """Learning rate along the gradient, from the tenth update on."""
     tail: float = 0.1
     """Share of a batch that counts as its worst cases."""
     tail_weight: float = 0.5

@@ -113,7 +113,8 @@ class Training:
 
     def _climb(self, recordings: Recordings) -> Best:
         options, network = self._options, self._network
-        climb, looks, best = Climb(network, recordings, options), _Looks(), Arrays()
+        climb, looks = Climb(network, recordings, options), _Looks()
+        best: Arrays = {}
         taken_up = self._read("climb")
         if taken_up is not None:
             looks = _Looks.of(taken_up["looks"])

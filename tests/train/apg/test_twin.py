@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from aframe_env import Crane, InvalidValue, Scenario, ScenarioDistribution, TaskConfig, Winch, task
+from aframe_env import Crane, InvalidValue, Scenario, ScenarioDistribution, TaskConfig, Told, Winch, task
 from aframe_env.scenario.series import drawn_scenarios
 from aframe_env.simulation import Simulation
 from aframe_env.suite import find_task
@@ -143,6 +143,8 @@ def test_an_untrained_network_is_a_regulator(recordings):
 def test_what_the_twin_does_not_know_is_refused():
     with pytest.raises(InvalidValue, match=r"lag = 0\.2 s: must be 0 s"):
         record([Scenario(crane=Crane(winch=Winch(lag=0.2)))], CONFIG, 0)
+    with pytest.raises(InvalidValue, match="must be as told"):
+        record([Scenario(told=Told(max_rope_speed=1.0))], CONFIG, 0)
     heavy = Scenario(crane=replace(Crane(), rope=replace(Crane().rope, mass_per_length=30.0)))
     with pytest.raises(InvalidValue, match="target that moves"):
         record([heavy], CONFIG, 0)
