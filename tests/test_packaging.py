@@ -63,6 +63,8 @@ import agents, agents.drives.map, agents.registry
 print(agents.__file__)
 for name in agents.shipped.AGENTS:
     print(name, agents.load(name).card.sha256, [spec.name for spec in agents.registry.choose_all([name])])
+for name in agents.shipped.RECURRENT:
+    print(name, [spec.name for spec in agents.registry.choose_all([name])])
 print(agents.drives.map.load().shape, agents.registry.choose("drive-map:clock").name)
 """
     said = python("-c", code, path=site, cwd=tmp_path)
@@ -70,11 +72,15 @@ print(agents.drives.map.load().shape, agents.registry.choose("drive-map:clock").
     where, *loaded, drive_map = said.stdout.splitlines()
     assert Path(where).is_relative_to(site)
     expected = []
-    for folder in sorted((ROOT / "results" / "agents").iterdir()):
+    folders = sorted((ROOT / "results" / "agents").iterdir())
+    recurrent = [folder for folder in folders if (folder / "seed-0" / "recurrent.json").exists()]
+    for folder in (folder for folder in folders if folder not in recurrent):
         agent = agents.load(folder / "seed-0")
         expected.append(f"{folder.name} {agent.card.sha256} ['{agent.name}']")
-    assert loaded == expected
     assert len(expected) == 8
+    expected.append("apg-storm ['recurrent APG on sensors']")
+    assert [folder.name for folder in recurrent] == ["apg-storm"]
+    assert loaded == expected
     assert drive_map == "(5, 8, 5, 8) drive map by the clock"
     assert not list(tmp_path.iterdir())
 
