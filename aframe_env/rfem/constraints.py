@@ -69,6 +69,12 @@ def servomotor_rows(frame: Frame, structure: Structure) -> Array:
     return np.vstack([-servomotor_direction(frame, side) @ structure.translation(f"N_{side}") for side in ("R", "L")])
 
 
+def servomotor_across(frame: Frame, structure: Structure) -> Array:
+    """(2, n): displacement of N_R and N_L across the servomotors, in the plane of leg and servomotor, up the leg."""
+    x, _, z = servomotor_direction(frame, "R")
+    return np.vstack([np.array([-z, 0.0, x]) @ structure.translation(f"N_{side}") for side in ("R", "L")])
+
+
 def _joint_rows(structure: Structure) -> list[Array]:
     rows = []
     for before, behind, place in structure.joints:

@@ -9,6 +9,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.sparse.linalg import splu
 
 from aframe_env.rfem.beam import Array
+from aframe_env.rfem.carriage import axes_states
 from aframe_env.rfem.constraints import servomotor_direction
 from aframe_env.rfem.deck import DeckStates
 from aframe_env.rfem.history import FrameHistory
@@ -41,7 +42,8 @@ def energy_balance(result: DynamicResult) -> EnergyBalance:
     """Compute the balance of a run whose output interval is its step (powers are integrated by the trapezoidal rule).
 
     The deck's work is that of the reactions, so this checks them too. They carry the frame as if every force on it
-    acted where it is undeformed, eq. (10); a deck that turns also works against the moments that displacements add.
+    acted where it is undeformed, eq. (10); a deck that turns and a frame that luffs also work against the moments that
+    displacements add. The tension of a servomotor keeps its undeformed direction.
 
     Raises:
         InvalidValue: The output interval is longer than the step.
@@ -53,50 +55,56 @@ def energy_balance(result: DynamicResult) -> EnergyBalance:
             f"output_interval = {case.output_interval} s: must be the step, {case.step} s, for a balance"
         )
     model, deck = history.model, result.deck
-    moving = _MovingFrame(history, deck)
-    kinetic = moving.kinetic() + 0.5 * scenario.load_mass * np.sum(result.load_velocity**2, axis=1)
-    potential = moving.potential(scenario.gravity) + scenario.weight * result.load[:, 2]
+    luffed = history.luffed
+    axes = axes_states(deck, model, luffed)
+    moving_frame = _MovingFrame(history, axes)
+    kinetic = moving_frame.kinetic() + 0.5 * scenario.load_mass * np.sum(result.load_velocity**2, axis=1)
+    potential = moving_frame.potential(scenario.gravity) + scenario.weight * result.load[:, 2]
     strain = 0.5 * np.einsum("ki,ki->k", history.position @ model.stiffness, history.position)
     length = scenario.free_length + crane.winch.drum_radius * result.drum_angle
     strain += 0.5 * result.elastic_tension**2 * length / crane.rope.axial_stiffness
     loss = np.einsum("ki,ki->k", history.velocity @ model.damping, history.velocity)
 
-    # The rope between S and H, and its pull on load and drum.
-    origin, turn = deck.position, deck.rotation
+    # The rope between S and H, and its pull on load and drum, in the base frame.
+    moved = history.position @ model.pulley.T
+    pulley_place, pulley_rate = np.array([0.0, 0.0, crane.frame.height]) + moved, history.velocity @ model.pulley.T
+    pulley = deck.position + _turned(axes.rotation, pulley_place)
+    pulley_speed = deck.velocity + _turned(axes.rotation, np.cross(axes.angular_velocity, pulley_place) + pulley_rate)
     drum_place = np.array(crane.drum_position)
-    pulley_place = np.array(crane.pulley_position) + history.displacement("S")
-    pulley_rate = history.velocity @ (model.to_deck @ model.pulley).T
-    to_drum = drum_place - pulley_place
+    to_drum = deck.position + deck.rotation @ drum_place - pulley
     to_drum /= np.linalg.norm(to_drum, axis=1)[:, None]
-    pulley = origin + np.einsum("kij,kj->ki", turn, pulley_place)
     to_load = result.load - pulley
     to_load /= np.linalg.norm(to_load, axis=1)[:, None]
-    deck_speed = np.einsum("kij,ki->kj", turn, deck.velocity)
 
     def speed_of(place: Array) -> Array:
-        return np.asarray(deck_speed + np.cross(deck.angular_velocity, place))
+        """Of a point fixed in {D}, in the base frame."""
+        return np.asarray(deck.velocity + _turned(deck.rotation, np.cross(deck.angular_velocity, place)))
 
-    pulley_speed = speed_of(pulley_place) + pulley_rate
-    rate = np.einsum("ki,ki->k", to_drum, speed_of(drum_place) - pulley_speed)
-    rate += np.einsum("ki,ki->k", to_load, result.load_velocity)
-    rate -= np.einsum("kij,ki,kj->k", turn, to_load, pulley_speed)
+    rate = np.sum(to_drum * (speed_of(drum_place) - pulley_speed), axis=1)
+    rate += np.sum(to_load * (result.load_velocity - pulley_speed), axis=1)
     rate -= crane.winch.drum_radius * result.drum_rate
     loss += (result.tension - result.elastic_tension) * rate
 
-    power = result.tension * np.einsum("ki,ki->k", to_drum, speed_of(drum_place))
+    power = result.tension * np.sum(to_drum * speed_of(drum_place), axis=1)
     feet = history.feet()
     frame, servomotors = model.frame, history.servomotors()
     for column, (side, sign) in enumerate((("R", -1.0), ("L", 1.0))):
         foot = np.array([0.0, sign * frame.half_width, 0.0])
-        power += np.einsum("ki,ki->k", feet[:, column], speed_of(foot))
+        power += np.sum(_turned(deck.rotation, feet[:, column]) * speed_of(foot), axis=1)
         end = np.array([frame.servomotor_deck_x, sign * frame.half_width, 0.0])
-        along = model.to_deck @ servomotor_direction(frame, side)
-        power -= servomotors[:, column] * (speed_of(end) @ along)
-    pull = np.einsum("kij,ki->kj", turn, to_load) + to_drum
-    pull *= result.tension[:, None]
-    spin = deck.angular_velocity @ model.to_deck
-    power -= np.sum(spin * (moving.moments() + np.cross(history.displacement("S"), pull) @ model.to_deck), axis=1)
-    if history.stroke is not None:
+        if luffed is None:
+            along = servomotor_direction(frame, side) * np.ones((deck.position.shape[0], 1))
+        else:
+            along = luffed.line
+            # The line turns in {F}, where N moves across it.
+            moving = history.velocity @ model.structure.translation(f"N_{side}").T
+            power -= servomotors[:, column] * np.sum(along * moving, axis=1)
+        power -= servomotors[:, column] * np.sum(speed_of(end) * _turned(axes.rotation, along), axis=1)
+    pull = result.tension[:, None] * _turned(axes.rotation.swapaxes(1, 2), to_load + to_drum)
+    power -= np.sum(axes.angular_velocity * (moving_frame.moments() + np.cross(moved, pull)), axis=1)
+    if luffed is not None:
+        power += history.luffing_power()
+    elif history.stroke is not None:
         power -= np.sum(servomotors * history.stroke[1], axis=1)
     drum = case.drum
     drawn = result.tension + 0.5 * result.elastic_tension**2 / crane.rope.axial_stiffness
@@ -120,14 +128,14 @@ def energy_balance(result: DynamicResult) -> EnergyBalance:
 class _MovingFrame:
     """The frame's slices over a run, along {F}."""
 
-    def __init__(self, history: FrameHistory, deck: DeckStates) -> None:
+    def __init__(self, history: FrameHistory, axes: DeckStates) -> None:
+        """``axes``: {F}, which carry it."""
         model = history.model
-        self._slices, self._deck, self._field = model.slices, deck, history.field
-        self._to_frame = deck.rotation @ model.to_deck
-        self._spin = _skew(deck.angular_velocity @ model.to_deck)
-        self._turning = _skew(deck.angular_acceleration @ model.to_deck) + self._spin @ self._spin
+        self._slices, self._axes, self._field = model.slices, axes, history.field
+        self._spin = _skew(axes.angular_velocity)
+        self._turning = _skew(axes.angular_acceleration) + self._spin @ self._spin
         forces = history.force - history.position @ model.stiffness - history.velocity @ model.damping
-        forces = forces + history.reactions() @ model.constraints.matrix
+        forces = forces + history.constraint_forces()
         accelerated = splu(model.mass.tocsc()).solve(np.ascontiguousarray(forces.T)).T
         self._moved, self._moving, self._accelerated = (
             [np.moveaxis(part, 2, 0) for part in self._slices.moved(np.ascontiguousarray(motion.T))]
@@ -137,7 +145,7 @@ class _MovingFrame:
     def kinetic(self) -> Array:
         """(k,), J: of slices that move by u + θ× y in a frame that turns."""
         slices, spin = self._slices, self._spin
-        own = np.einsum("kij,ki->kj", self._to_frame, self._deck.velocity)
+        own = np.einsum("kij,ki->kj", self._axes.rotation, self._axes.velocity)
         place = slices.place + self._moved[0]
         speed = own[:, None] + np.einsum("kij,ksj->ksi", spin, place) + self._moving[0]
         gradient = spin[:, None] @ (np.eye(3) + _skew(self._moved[1])) + _skew(self._moving[1])
@@ -146,8 +154,8 @@ class _MovingFrame:
 
     def potential(self, gravity: float) -> Array:
         """(k,), J."""
-        place = np.einsum("kj,ksj->ks", self._to_frame[:, 2], self._slices.place + self._moved[0])
-        return np.asarray(gravity * (self._slices.mass @ (self._deck.position[:, 2] + place.T)))
+        place = np.einsum("kj,ksj->ks", self._axes.rotation[:, 2], self._slices.place + self._moved[0])
+        return np.asarray(gravity * (self._slices.mass @ (self._axes.position[:, 2] + place.T)))
 
     def moments(self) -> Array:
         """Moments of weight and inertia that the displacements add, about the deck's origin, (k, 3), N m."""
@@ -161,6 +169,11 @@ class _MovingFrame:
         return np.asarray(
             total - np.einsum("iab,ksac,scd,ksbd->ki", SKEW, turned, slices.second, gradient, optimize=True)
         )
+
+
+def _turned(rotation: Array, vectors: Array) -> Array:
+    """Vectors (k, 3) turned by rotations (k, 3, 3)."""
+    return np.asarray(np.einsum("kij,kj->ki", rotation, vectors))
 
 
 def _skew(vectors: Array) -> Array:

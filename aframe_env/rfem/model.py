@@ -19,7 +19,7 @@ import scipy
 from aframe_env.dynamics.flexible.readout import SMALL_ROTATION
 from aframe_env.rfem.banded import BandedCholesky
 from aframe_env.rfem.beam import Array
-from aframe_env.rfem.constraints import Constraints, constrain, luffing_rotation, servomotor_rows
+from aframe_env.rfem.constraints import Constraints, constrain, luffing_rotation, servomotor_across, servomotor_rows
 from aframe_env.rfem.slices import Slices, slices_of
 from aframe_env.rfem.structure import Division, Structure, one_chain, three_beams
 from aframe_env.scenario.crane import GRAVITY, Frame
@@ -96,6 +96,11 @@ class FrameModel:
         return servomotor_rows(self.frame, self.structure)
 
     @cached_property
+    def across_servomotors(self) -> Array:
+        """(2, n): displacement of N_R and N_L across the servomotors, in the plane of leg and servomotor."""
+        return servomotor_across(self.frame, self.structure)
+
+    @cached_property
     def lengthening(self) -> Array:
         """(n, 2): q at rest and unloaded for S_R or S_L longer by 1 m; zero where they are elastic."""
         if self.frame.structure.servomotor.stiffness is not None:
@@ -165,11 +170,12 @@ class FrameModel:
         springs = servomotor.stiffness * position + servomotor.damping * velocity
         return np.asarray(-springs @ self.servomotors.T)
 
-    def foot_reactions(self, reactions: Array) -> Array:
-        """Forces on the frame at A_R and A_L along {D}, (…, 2, 3), N."""
+    def foot_reactions(self, reactions: Array, to_deck: Array | None = None) -> Array:
+        """Forces on the frame at A_R and A_L along {D}, (…, 2, 3), N; ``to_deck``: {F} → {D} where the frame has
+        luffed, (…, 3, 3)."""
         first = self.constraints.names.index("R_AR1")
         feet = reactions[..., first : first + 6].reshape(*reactions.shape[:-1], 2, 3)
-        return np.asarray(feet @ self.to_deck.T)
+        return np.asarray(feet @ (self.to_deck if to_deck is None else to_deck).swapaxes(-1, -2))
 
     def spring_forces(self, position: Array, velocity: Array | None = None, field: Array | None = None) -> Array:
         """Section forces N, V2, V3, T, M2, M3 at the sdes, (…, n_sde, 6), N and N m (N tension positive).

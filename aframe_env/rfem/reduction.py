@@ -31,7 +31,7 @@ CARRIED_MODES = 8
 ones."""
 STATIC_SHAPES = 11
 """Most static shapes beside the modes of a reduced frame: a force at S, a uniform field, the deck's angular
-acceleration, three each; the lengths of two servomotors."""
+acceleration, three each; the lengths of two servomotors. A frame that luffs has two more, of forces across them."""
 ROUNDING = 1e-9
 """Share of the damping's diagonal up to which what lies off it is rounding."""
 SPARSE = 600
@@ -139,13 +139,16 @@ def modal_frame(frame: Frame, division: Division, modes: int | None) -> ModalFra
     return modal_form(model, natural_modes(model, modes), CARRIED_MODES)
 
 
-def modal_form(model: FrameModel, modes: tuple[Array, Array], carried_modes: int | None = None) -> ModalFrame:
+def modal_form(
+    model: FrameModel, modes: tuple[Array, Array], carried_modes: int | None = None, *, luffs: bool = False
+) -> ModalFrame:
     """Modal form of a model.
 
     Args:
         model: The frame.
         modes: Its natural modes, all or the lowest, see ``natural_modes``.
         carried_modes: The most whose own displacement is to feel the turning of the deck; None for all.
+        luffs: Whether forces across the servomotors are to have static shapes.
     """
     to_deck, turning = model.to_deck, np.zeros((model.structure.size, 3, 3))
     for c, d, unit in _units(model):
@@ -154,9 +157,10 @@ def modal_form(model: FrameModel, modes: tuple[Array, Array], carried_modes: int
     spin_up = np.stack([turning[:, d, c] - turning[:, c, d] for c, d in ((1, 2), (2, 0), (0, 1))], axis=1)
     rigid = model.frame.structure.servomotor.stiffness is None
     lengths = [model.mass @ model.lengthening] if rigid else []
+    loads = np.hstack([pulley.T, uniform, spin_up, *lengths, *([model.across_servomotors.T] if luffs else [])])
     squares, shape = modes
-    if squares.size + STATIC_SHAPES < model.constraints.basis.shape[1]:
-        squares, shape = with_static_shapes(model, modes, np.hstack([pulley.T, uniform, spin_up, *lengths]))
+    if squares.size + max(STATIC_SHAPES, loads.shape[1]) < model.constraints.basis.shape[1]:
+        squares, shape = with_static_shapes(model, modes, loads)
     return ModalFrame(
         model=model,
         natural=modes[0].size,
@@ -170,14 +174,14 @@ def modal_form(model: FrameModel, modes: tuple[Array, Array], carried_modes: int
     )
 
 
-def resolved_form(model: FrameModel, step: float) -> ModalFrame:
+def resolved_form(model: FrameModel, step: float, *, luffs: bool = False) -> ModalFrame:
     """Modal form of a model with the modes that a ``step``, s, resolves: of a period of two steps or more.
 
     Damping that couples modes reaches those above too; a frame of few rfes keeps them all for it.
     """
-    modal = modal_form(model, modes_below(model, math.pi / step))
+    modal = modal_form(model, modes_below(model, math.pi / step), luffs=luffs)
     if modal.couples and modal.natural < model.constraints.basis.shape[1] < SPARSE:
-        return modal_form(model, natural_modes(model))
+        return modal_form(model, natural_modes(model), luffs=luffs)
     return modal
 
 

@@ -3,28 +3,28 @@
 The frame steps exactly in its modes under forces that are interpolated over the step; load and drum step by Fox and
 Goodwin's scheme. The rope's force at the step's end is found by iteration to convergence (no splitting): the frame
 answers it at S through constant 3 × 3 matrices, so that an iteration costs no step of the frame. Modes of a period
-below two steps are left out, but for their static shapes.
+below two steps are left out, but for their static shapes. Of a frame that luffs see :mod:`aframe_env.rfem.luffed`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 
 from aframe_env.rfem.beam import Array
-from aframe_env.rfem.deck import DeckStates, deck_coordinates, deck_states
-from aframe_env.rfem.exact_step import exact_step
+from aframe_env.rfem.carriage import Carriage
+from aframe_env.rfem.deck import DeckStates
 from aframe_env.rfem.history import FrameHistory
+from aframe_env.rfem.luffed import angle_nodes, luffed_frame, model_at
 from aframe_env.rfem.model import FrameModel, frame_model
-from aframe_env.rfem.reduction import ModalFrame, of_motion, resolved_form
 from aframe_env.rfem.rope_law import RopeForce, rope_force
 from aframe_env.rfem.servomotor_stroke import Stroke, strokes_at
+from aframe_env.rfem.stage import Stage, TurningServomotors
 from aframe_env.rfem.statics import LoadCase, solve, static
-from aframe_env.rfem.structure import cross_matrix
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_number
 
@@ -68,12 +68,12 @@ class DynamicCase:
     """One dynamic run."""
 
     scenario: Scenario = field(default_factory=Scenario.paper)
-    """Crane, ship motion, load and rope; the load starts from static equilibrium. The luffing angle stays as it is, but
-    for the small rotations that ``strokes`` make."""
+    """Crane, ship motion, load and rope; the load starts from static equilibrium. Where it has no ``luffing`` the
+    luffing angle stays as it is, but for the small rotations that ``strokes`` make."""
     drum: Drum = field(default_factory=StillDrum)
     """Motion of the drum."""
     strokes: tuple[Stroke, Stroke] | None = None
-    """Prescribed change of the lengths of rigid servomotors S_R and S_L; None: none."""
+    """Prescribed change of the lengths of rigid servomotors S_R and S_L; None: none but what the luffing asks for."""
     duration: float = 60.0
     """s."""
     second_order: bool = False
@@ -85,14 +85,24 @@ class DynamicCase:
     """s."""
 
     def __post_init__(self) -> None:
-        self.scenario.require_light("stand-alone runs of the full model")
+        replace(self.scenario, luffing=None).require_light("stand-alone runs of the full model")
         require_number("duration", self.duration, "s", low=0.0, low_open=True)
         require_number("step", self.step, "s", low=0.0, low_open=True)
         require_number("output_interval", self.output_interval, "s", low=0.0, low_open=True)
         if self.output_interval > self.duration:
             raise InvalidValue(f"output_interval = {self.output_interval} s: must be in (0, {self.duration:g}] s")
-        if self.strokes is not None and self.scenario.crane.frame.structure.servomotor.stiffness is not None:
+        elastic = self.scenario.crane.frame.structure.servomotor.stiffness
+        if self.second_order and self.scenario.luffing is not None:
+            raise InvalidValue("second_order = True: must be False with luffing, as the state at rest changes")
+        if self.strokes is not None and elastic is not None:
             raise InvalidValue("strokes: must be None with elastic servomotors, as only rigid ones have a given length")
+        if self.scenario.luffing is not None and elastic is not None:
+            raise InvalidValue(
+                f"servomotor.stiffness = {elastic!r} N/m: must be None, rigid, with luffing, as only rigid ones have a "
+                "given length"
+            )
+        if self.scenario.luffing is not None and self.strokes is not None:
+            raise InvalidValue("strokes: must be None with luffing, which has strokes of its own")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,33 +133,6 @@ class DynamicResult:
         return self.frame.time
 
 
-class _Carriage:
-    """The deck at every step, in the shape that the frame's axes {F} want."""
-
-    def __init__(self, scenario: Scenario, model: FrameModel, step: float, count: int) -> None:
-        self.states = deck_states(deck_coordinates(scenario, step, count))
-        states, crane, to_deck = self.states, scenario.crane, model.to_deck
-        self.pulley_place, self.pulley_speed = _carried_point(states, np.array(crane.pulley_position))
-        self.drum_place, self.drum_speed = _carried_point(states, np.array(crane.drum_position))
-        self.rotation = states.rotation @ to_deck
-        """{F} → base frame, (k, 3, 3)."""
-        gravity = np.array([0.0, 0.0, -scenario.gravity])
-        self.field = np.einsum("kij,ki->kj", self.rotation, gravity - states.acceleration)
-        self.spin = states.angular_velocity @ to_deck
-        spin_up = states.angular_acceleration @ to_deck
-        self.turns = bool(np.any(self.spin) or np.any(spin_up))
-        skew = np.array([cross_matrix(vector) for vector in self.spin])
-        self.turning = np.array([cross_matrix(vector) for vector in spin_up]) + skew @ skew
-        self.coriolis = 2.0 * skew
-
-
-def _carried_point(states: DeckStates, place: Array) -> tuple[Array, Array]:
-    """Place and velocity in the base frame, (k, 3) each, of a point fixed at ``place`` in {D}."""
-    position = states.position + states.rotation @ place
-    turning = np.cross(states.angular_velocity, place)
-    return position, states.velocity + np.einsum("kij,kj->ki", states.rotation, turning)
-
-
 class _Run:
     """State and constants of one run; :func:`simulate` drives it."""
 
@@ -160,26 +143,18 @@ class _Run:
         self.outputs = max(1, round(case.duration / case.output_interval))
         self.step = case.output_interval / inner
         self.times: Array = self.step * np.arange(self.outputs * inner + 1, dtype=np.float64)
-        self.carriage = _Carriage(self.scenario, model, self.step, self.times.size)
-        self.modal = resolved_form(model, self.step)
-        self.exact = exact_step(self.modal, self.step)
+        luffing = self.scenario.luffing
+        self.luffed = None if luffing is None else luffed_frame(model.frame, luffing, self.times)
+        self.carriage = Carriage(self.scenario, model, self.luffed, self.step, self.times.size)
+        self.nodes = np.array([model.frame.luffing_angle]) if luffing is None else angle_nodes(luffing)
+        self.stages: dict[int, Stage] = {}
+        self.stage = self._stage_at(0)
         self.stroke = strokes_at(case.strokes, self.times)
-        given, shape = model.lengthening, self.modal.shape
-        driving = np.hstack([model.uniform_field(), -(model.damping @ given), -(model.mass @ given)])
-        driven_by = np.hstack([self.carriage.field, self.stroke[1], self.stroke[2]])
-        self.driven = driven_by @ (shape.T @ driving).T
-        """Forces on the modes that do not depend on their state, (steps, m)."""
-        self.carried = _Carried(self.carriage, self.modal, self.stroke)
-        self.pulley = model.pulley @ shape
-        self.given = model.pulley @ given
-        cubic, linear = (
-            np.array([[self.pulley @ self.exact.times(part, self.pulley.T) for part in row] for row in factors])
-            for factors in (self.exact.cubic, self.exact.linear)
-        )
-        self.answer = np.stack([cubic[:, 2], cubic[:, 3], linear[:, 1]], axis=1)
-        """Place and rate of S by the rope's elastic force, its rate, and its damping force at the end: (2, 3, 3, 3)."""
+        """s, ṡ, s̈ at every step, (3, steps, 2); of a frame that luffs as the run finds them."""
+        self.across = np.zeros(2)
+        """Last forces of the servomotors on N_R and N_L across their line in the stage, N."""
         self.radius, self.unstretched = self.crane.winch.drum_radius, self.scenario.free_length
-        self.place, self.rates = np.zeros(self.modal.count), np.zeros(self.modal.count)
+        self.place, self.rates = np.zeros(self.stage.count), np.zeros(self.stage.count)
         self.load, self.load_velocity, self.load_acceleration = (np.zeros(3) for _ in range(3))
         self.angle, self.rate, self.angular_acceleration = 0.0, 0.0, 0.0
         self.force = np.zeros(9)
@@ -214,9 +189,37 @@ class _Run:
             self.load_velocity = states.velocity[0] + states.rotation[0] @ arm
         if isinstance(self.case.drum, PrescribedDrum):
             self.angle, self.rate = self.case.drum.angle(0.0), self.case.drum.rate(0.0)
-        self.place = self.modal.coordinates(position - model.lengthening @ self.stroke[0, 0])
-        self._evaluate(0, self.pulley @ self.place + self.given @ self.stroke[0, 0], self.given @ self.stroke[1, 0])
+        still = np.zeros_like(position)
+        self.place, self.rates = self.stage.coordinates(position, still, self.stroke[:2, 0])
+        self._beside(0, self.place, self.rates)
+        self._evaluate(0, *self._pulley(0, (self.place, self.rates)))
+        self._beside(0, self.place, self.rates)
         self.last_force, self.last_acceleration = self.force, self.load_acceleration
+
+    def _stage_at(self, index: int) -> Stage:
+        """Stage whose luffing angle is the nearest at time ``index``."""
+        angle = self.model.frame.luffing_angle if self.luffed is None else self.luffed.swing.angle[index]
+        node = int(np.argmin(np.abs(self.nodes - angle)))
+        if node not in self.stages:
+            model = self.model if self.luffed is None else model_at(self.model, float(self.nodes[node]))
+            self.stages[node] = Stage(model, self.carriage, self.luffed, self.step)
+        return self.stages[node]
+
+    def state(self, index: int) -> tuple[Array, Array]:
+        """q and q̇, (n,), at time ``index``, the present one."""
+        stage, stroke = self.stage, self.stroke[:, index]
+        return stage.shape @ self.place + stage.given @ stroke[0], stage.shape @ self.rates + stage.given @ stroke[1]
+
+    def _pulley(self, index: int, modes: Sequence[Array]) -> list[Array]:
+        """Displacement of S along {F} and its rate, (3,), by η and η̇."""
+        stage = self.stage
+        return [stage.pulley @ part + stage.pulley_given @ self.stroke[row, index] for row, part in enumerate(modes)]
+
+    def _beside(self, index: int, place: Array, rates: Array) -> Array:
+        """Forces on the modes beside the rope's, (m,); writes the stroke of a frame that luffs."""
+        pull = self.force[:3] + self.force[6:]
+        total, self.across = self.stage.forces(index, place, rates, self.stroke[:, index], pull)
+        return total
 
     def _evaluate(self, index: int, deflection: Array, deflection_rate: Array) -> None:
         """Find rope force at S (along {F}) and accelerations of load and drum at the present state of these two."""
@@ -269,7 +272,12 @@ class _Run:
 
     def advance(self, index: int) -> None:
         """Step to time ``index``."""
-        exact, h = self.exact, self.step
+        stage = self._stage_at(index)
+        if stage is not self.stage:
+            position, velocity = self.state(index - 1)
+            self.stage = stage
+            self.place, self.rates = stage.coordinates(position, velocity, self.stroke[:2, index - 1])
+        exact, h = stage.exact, self.step
         half, early, late = 0.5 * h, (0.5 - FOX_GOODWIN) * h**2, FOX_GOODWIN * h**2
         load = self.load + h * self.load_velocity + early * self.load_acceleration
         load_rate = self.load_velocity + half * self.load_acceleration
@@ -279,18 +287,16 @@ class _Run:
         if isinstance(drum, PrescribedDrum):
             time = float(self.times[index])
             self.angle, self.rate = drum.angle(time), drum.rate(time)
-        before = self.driven[index - 1] + self.carried.force(index - 1, self.place, self.rates)
-        elastic, growth, damping = self.force.reshape(3, 3) @ self.pulley
+        before = self._beside(index - 1, self.place, self.rates)
+        elastic, growth, damping = self.force.reshape(3, 3) @ stage.pulley
         known = [
             exact.times(exact.free[row, 0], self.place)
             + exact.times(exact.free[row, 1], self.rates)
             + exact.times(exact.cubic[row, 0], elastic)
             + exact.times(exact.cubic[row, 1], growth)
             + exact.times(exact.linear[row, 0], before + damping)
-            + exact.times(exact.linear[row, 1], self.driven[index])
             for row in range(2)
         ]
-        given = self.given @ self.stroke[:2, index].T
         # c times the rounding of a length is some 1e-16 E_R F_R: ask for no more than that allows.
         tolerance = 1e-11 * self.scenario.weight + 1e-14 * self.crane.rope.axial_stiffness
         # Begin the iteration where force and load go on as they did in the last step.
@@ -299,12 +305,12 @@ class _Run:
         self.load_acceleration = 2.0 * pulled - self.last_acceleration
         self.last_force, self.last_acceleration = force, pulled
         place, rates = known
-        for _ in range(30 if self.carriage.turns else 1):
-            carried = self.carried.force(index, place, rates)
-            begun = [part + exact.times(exact.linear[row, 1], carried) for row, part in enumerate(known)]
-            base = [self.pulley @ part + given[:, row] for row, part in enumerate(begun)]
+        for _ in range(30 if stage.depends else 1):
+            aside = self._beside(index, place, rates)
+            begun = [part + exact.times(exact.linear[row, 1], aside) for row, part in enumerate(known)]
+            base = self._pulley(index, begun)
             for _ in range(60):
-                answer = np.einsum("rkab,kb->ra", self.answer, self.force.reshape(3, 3))
+                answer = np.einsum("rkab,kb->ra", stage.answer, self.force.reshape(3, 3))
                 felt = self.force
                 self.load = load + late * self.load_acceleration
                 self.load_velocity = load_rate + half * self.load_acceleration
@@ -320,7 +326,7 @@ class _Run:
                     f"step = {self.case.step} s: must be smaller, as the rope's force did not converge at "
                     f"t = {self.times[index]:.4f} s"
                 )
-            elastic, growth, damping = self.force.reshape(3, 3) @ self.pulley
+            elastic, growth, damping = self.force.reshape(3, 3) @ stage.pulley
             ends = [
                 part
                 + exact.times(exact.cubic[row, 2], elastic)
@@ -330,37 +336,9 @@ class _Run:
             ]
             moved = max(float(np.max(np.abs(ends[0] - place))), h * float(np.max(np.abs(ends[1] - rates))))
             place, rates = ends
-            if not self.carriage.turns or moved <= 1e-9 * max(1.0, float(np.max(np.abs(place)))):
+            if not stage.depends or moved <= 1e-9 * max(1.0, float(np.max(np.abs(place)))):
                 break
         self.place, self.rates = place, rates
-
-
-class _Carried:
-    """Forces on the modes by the deck's turning, beyond the uniform field: less E_1 W + E(W) q + E(2 Ω×) q̇."""
-
-    def __init__(self, carriage: _Carriage, modal: ModalFrame, stroke: Array) -> None:
-        self._turns, self._none = carriage.turns, np.zeros(modal.count)
-        if not carriage.turns:
-            return
-        # W and 2 Ω× along {D}, as the tables of the modal form have them.
-        to_deck = modal.model.to_deck
-        self._turning, self._coriolis = (
-            (to_deck @ part @ to_deck.T).reshape(-1, 9) for part in (carriage.turning, carriage.coriolis)
-        )
-        self._own = np.ascontiguousarray(
-            modal.project(modal.carried).reshape(modal.count, modal.count, 9).transpose(2, 0, 1)
-        )
-        given = modal.project(of_motion(modal.model, modal.model.lengthening)).reshape(modal.count, 2, 9)
-        self._constant = self._turning @ modal.project(modal.turning).reshape(-1, 9).T
-        self._constant += np.einsum("kw,mbw,kb->km", self._turning, given, stroke[0])
-        self._constant += np.einsum("kw,mbw,kb->km", self._coriolis, given, stroke[1])
-
-    def force(self, index: int, place: Array, rates: Array) -> Array:
-        """At time ``index``, of η and η̇, (m,)."""
-        if not self._turns:
-            return self._none
-        own = self._turning[index] @ (self._own @ place) + self._coriolis[index] @ (self._own @ rates)
-        return np.asarray(-self._constant[index] - own)
 
 
 def simulate(case: DynamicCase | None = None, *, model: FrameModel | None = None) -> DynamicResult:
@@ -368,7 +346,8 @@ def simulate(case: DynamicCase | None = None, *, model: FrameModel | None = None
 
     Args:
         case: The run; default the paper's case with the drum still.
-        model: The frame's model, if it is not to be the default one (10 and 8 elements).
+        model: The frame's model, if it is not to be the default one (10 and 8 elements); where the scenario luffs, at
+            any luffing angle, best at :func:`aframe_env.rfem.luffed.middle_frame`.
 
     Warns:
         SmallRotationWarning: An rfe turns by more than 0.05 rad.
@@ -386,14 +365,17 @@ def simulate(case: DynamicCase | None = None, *, model: FrameModel | None = None
     run = _Run(what, frame)
     run.start()
     count = run.outputs + 1
-    states = np.zeros((count, 2, run.modal.count))
+    full = np.zeros((count, 2, frame.structure.size))
     body = np.zeros((count, 11))
-    forces = np.zeros((count, 3))
+    forces, across = np.zeros((count, 3)), np.zeros((count, 2))
+    servomotors: list[TurningServomotors] = []
 
     def store(output: int) -> None:
-        states[output] = run.place, run.rates
+        full[output] = run.state(output * run.inner)
         body[output] = [*run.load, *run.load_velocity, *run.rope, run.angle, run.rate]
-        forces[output] = run.force[:3] + run.force[6:]
+        forces[output], across[output] = run.force[:3] + run.force[6:], run.across
+        if run.stage.servomotors is not None:
+            servomotors.append(run.stage.servomotors)
 
     store(0)
     for output in range(1, count):
@@ -402,27 +384,30 @@ def simulate(case: DynamicCase | None = None, *, model: FrameModel | None = None
         store(output)
 
     kept = slice(0, None, run.inner)
-    full = states @ run.modal.shape.T
-    stroke = run.stroke[:, kept]
-    full += (stroke[:2] @ frame.lengthening.T).transpose(1, 0, 2)
     force = run.carriage.field[kept] @ frame.uniform_field().T + forces @ frame.pulley
     if run.carriage.turns:
         for output, (position, velocity) in enumerate(full):
             turning, coriolis = (part[output * run.inner] for part in (run.carriage.turning, run.carriage.coriolis))
             force[output] -= frame.slices.of_field(turning) + frame.slices.of_motion(turning, position)
             force[output] -= frame.slices.of_motion(coriolis, velocity)
+    history = FrameHistory(
+        model=frame,
+        time=run.times[kept],
+        position=full[:, 0],
+        velocity=full[:, 1],
+        force=force,
+        field=run.carriage.field[kept],
+        stroke=None if what.strokes is None else run.stroke[:, kept],
+    )
+    if run.luffed is not None:
+        residual = full[:, 0] @ frame.stiffness + full[:, 1] @ frame.damping - force
+        rows = zip(range(0, run.times.size, run.inner), residual, across, run.stroke[2, kept], strict=True)
+        reactions = np.array([item.reactions(*row) for item, row in zip(servomotors, rows, strict=True)])
+        history = replace(history, luffed=run.luffed.every(run.inner), held=reactions)
     frame.warn_of_rotation(full[:, 0])
     return DynamicResult(
         case=what,
-        frame=FrameHistory(
-            model=frame,
-            time=run.times[kept],
-            position=full[:, 0],
-            velocity=full[:, 1],
-            force=force,
-            field=run.carriage.field[kept],
-            stroke=None if what.strokes is None else stroke,
-        ),
+        frame=history,
         load=body[:, :3],
         load_velocity=body[:, 3:6],
         tension=body[:, 6],

@@ -53,7 +53,7 @@ its own weight stays; undamped:
   output_interval = 0.005      s
   step = 0.0001                s
 
---dynamic, the load on the rope, the ship moving, the drum still:
+--dynamic, the load on the rope, the ship moving, the drum still, the frame luffing if asked for:
   duration = 60.0              s
   output_interval = 0.05       s
   step = 0.0025                s
@@ -77,6 +77,9 @@ its own weight stays; undamped:
   [crane.frame.structure.servomotor]
   stiffness = 3e8              N/m, each; without it: rigid
   damping = 0.0                N s/m, each
+  [luffing]                    a frame that luffs on rigid servomotors; without it, it holds
+  points = [[1, 25.0], [21, -20.0]]
+                               s and degrees, the first those of luffing_angle; max_speed, max_acceleration
 """
 
 FINE = Division(leg=120, beam=100)
@@ -194,10 +197,14 @@ def columns_of(history: FrameHistory) -> dict[str, npt.NDArray[np.float64]]:
 
 
 def dynamic_columns(result: DynamicResult) -> dict[str, npt.NDArray[np.float64]]:
-    """Columns of load and rope, and :func:`columns_of` the frame."""
+    """Columns of load and rope, and :func:`columns_of` the frame; of one that luffs its angle and the power for it."""
     columns = {f"xL{axis + 1}_m": result.load[:, axis] for axis in range(3)}
     columns |= {f"vL{axis + 1}": result.load_velocity[:, axis] for axis in range(3)}
-    return columns | {"T_rope_N": result.tension} | columns_of(result.frame)
+    columns |= {"T_rope_N": result.tension} | columns_of(result.frame)
+    luffed = result.frame.luffed
+    if luffed is None:
+        return columns
+    return columns | {"luffing_rad": luffed.swing.angle, "P_luffing_W": result.frame.luffing_power()}
 
 
 def release_case(data: Mapping[str, Any]) -> dict[str, object]:
