@@ -21,7 +21,8 @@ if sys.platform == "win32":
 QUIET = Console(quiet=True)
 
 
-@pytest.mark.parametrize("learner", ["train.ppo", pytest.param("train.sac", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("learner", ["train.ppo", "train.sac"])
 def test_a_training_survives_kills(learner: str, tmp_path: Path) -> None:
     options = torture.Options(kills=3, only=f"{learner}, killed", out=tmp_path / "reliability.json")
     assert torture.run(options, QUIET) == 0

@@ -25,6 +25,7 @@ COMMANDS = {
     ),
     "train.verify.__main__": (),
 }
+LONG = ("train.optimisers", "train.verify.__main__")
 FOLDER = {"train.verify.__main__": "--folder"}
 
 
@@ -39,7 +40,10 @@ def command(name, folder, monkeypatch):
     return importlib.import_module(name).main()
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in COMMANDS],
+)
 def test_a_killed_command_goes_on_and_ends_with_the_same_bytes(name, tmp_path, monkeypatch, capsys):
     if name == "train.sensitivity.__main__":
         pytest.importorskip("SALib", reason="needs the extra sensitivity")

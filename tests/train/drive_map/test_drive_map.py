@@ -26,6 +26,7 @@ def arguments(folder):
     return [*axes, *few, "--store", str(folder / "nodes.sqlite"), "--out", str(folder / "out")]
 
 
+@pytest.mark.slow
 def test_a_build_that_is_killed_goes_on_where_it_was(tmp_path, monkeypatch, capsys, kill_module, jobs_in):
     kept = kill_module(tmp_path / "nodes.sqlite", 2, "train.drive_map", *arguments(tmp_path))
     assert 2 <= kept < 24

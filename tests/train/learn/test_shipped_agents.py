@@ -1,4 +1,4 @@
-"""What is shipped still does what the committed comparison says of it: agents of all seeds, laws, map and optimum."""
+"""What is shipped still does what the committed tables say of it: agents of all seeds, laws, map and optimum."""
 
 import json
 from functools import cache
@@ -9,8 +9,10 @@ import pytest
 from pyarrow.parquet import read_table
 
 from aframe_env import ScenarioDistribution, TaskConfig
+from aframe_env.suite import TASKS, find_task
 from agents.registry import BuildContext, choose_all
 from agents.rollout import held_out_scenarios, run
+from train.benchmark import ceiling, leaderboard
 from train.evaluate.run import observation_of
 from train.shared.run_folder import versions
 
@@ -22,9 +24,12 @@ inverse makes a rounding of 1e-8 by another processor or library one of 1e-4, wh
 that err by 3e-8 of themselves move the rms by up to 0.0065 and the amplitude by up to 0.027."""
 EXACT = {"drive map in real time": 1e-10}
 """Relative, where all else is exact: the magnitude of a complex number rounds by its place in an array."""
+AGENTS = [str(folder) for folder in sorted((RESULTS / "agents").iterdir())]
+SPECIALISTS = [agents for agents in AGENTS if agents.endswith(tuple(f"-{task.lower()}" for task in TASKS))]
+"""Agents that learned a task of the suite: their figures are in the leaderboard."""
 POLICIES = choose_all(
     [
-        *(str(folder) for folder in sorted((RESULTS / "agents").iterdir())),
+        *(agents for agents in AGENTS if agents not in SPECIALISTS),
         str(RESULTS / "drive-map"),
         "feed-forward + feedback (state)",
         "feed-forward + feedback",
@@ -67,3 +72,22 @@ def test_a_policy_meets_the_committed_figures(spec):
         elif name in ELSEWHERE:
             still = np.array([row[name] for row in committed()["drum still"]])
             np.testing.assert_allclose(values / still, figures / still, rtol=0.0, atol=ELSEWHERE[name])
+
+
+@pytest.mark.parametrize("folder", SPECIALISTS, ids=lambda folder: Path(folder).name)
+def test_an_agent_of_a_task_meets_its_row_of_the_leaderboard(folder):
+    task, specs = find_task(Path(folder).name.rpartition("-")[2]), choose_all([folder])
+    config, scenarios = TaskConfig(**task.arguments), task.scenarios("test", 100)
+    digests = tuple(spec.digest for spec in specs)
+    rows = leaderboard.read(RESULTS / "tasks" / leaderboard.NAME)
+    (row,) = [row for row in rows if (row.task, row.sha256, row.scenarios) == (task.id, digests, 100)]
+    stored = ceiling.read(RESULTS / "tasks" / task.name.lower() / ceiling.file_name("test"))
+    assert row.seeds == len(specs)
+    shares = []
+    for spec in specs:
+        policy = spec.build(BuildContext(scenarios=scenarios, config=config))
+        ran = config.replaced(observation=observation_of(policy, config))
+        left = run(policy, scenarios, ran, noise_seed=task.seed("test")).rms
+        shares.append((1.0 - left / np.array(stored.still)) / stored.reductions)
+    assert np.mean(shares) == pytest.approx(row.share.value, abs=1e-3)
+    assert np.mean([np.sort(each)[:5].mean() for each in shares]) == pytest.approx(row.share_worst.value, abs=1e-2)
