@@ -53,7 +53,11 @@ def draw_magnified(
         anchor="midright",
     )
     sea = (left + 10.0, top + 34.0, width - 20.0, height - 44.0)
-    canvas.gradient(sea, palette.NEAR_WATER, palette.DEEP_WATER)
+    surface = scene.water.heights(scene.load[:1], float(scene.load[1]), scene.time)[0]
+    if scene.load[2] > surface:
+        canvas.gradient(sea, palette.HIGH_AIR, palette.LOW_AIR)
+    else:
+        canvas.gradient(sea, palette.NEAR_WATER, palette.DEEP_WATER)
     recent = history[history[:, 0] >= scene.time - MEMORY, 1]
     # Beside the load with the drum still there is one scale for all the time that the chart has: it hardly changes.
     shown = recent if still is None else history[:, 1:].ravel()

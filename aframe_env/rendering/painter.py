@@ -49,7 +49,8 @@ class Painter:
         x, y = draw_side_view(canvas, _SIDE_VIEW, scene, still)
         canvas.round_off(_SIDE_VIEW, palette.PAGE, 8.0)
         left, bottom = _MAGNIFIED[0], _MAGNIFIED[1] + _MAGNIFIED[3]
-        lens = [(x + 18.0, y - 9.0), (left, bottom - 74.0), (left, bottom - 6.0), (x + 18.0, y + 9.0)]
+        into = min(max(y - 34.0, _MAGNIFIED[1] + 40.0), bottom - 74.0)
+        lens = [(x + 18.0, y - 9.0), (left, into), (left, into + 68.0), (x + 18.0, y + 9.0)]
         canvas.polygon(lens, palette.FAR_WATER, opacity=0.45)
         draw_magnified(canvas, _MAGNIFIED, scale_of(scene), scene, history, still)
         draw_instruments(canvas, _INSTRUMENTS, scene)

@@ -1,7 +1,8 @@
-"""The side view: sea, ship, A-frame, rope, and below the rope left out, the load."""
+"""The side view: sea, ship, A-frame, rope, and the load: where it is, or below the rope left out."""
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -38,12 +39,16 @@ def draw_side_view(canvas: Canvas, box: Box, scene: Scene, still: Scene | None =
     """Draw the side view, and the load of ``still`` beside its own; return the pixel about which the load is seen."""
     left, top, width, height = box
     view = View((left + width - _AFT, top + _ABOVE), scale_of(scene), _RECESSION)
-    upper = (left, top, width, height - _BELOW)
+    # By the target, not by the load, so that a load that heaves does not change the picture.
+    near = float(view.pixels([0.0, 0.0, scene.target_level])[1]) < top + height - _BELOW
+    upper = box if near else (left, top, width, height - _BELOW)
     with canvas.within(upper):
         canvas.gradient(upper, palette.SKY_TOP, palette.SKY_LOW)
         _draw_water(canvas, view, upper, scene, _FAR, palette.FAR_WATER, 1.0)
         draw_ship(canvas, view, scene)
         draw_frame_and_drum(canvas, view, scene)
+        if near:
+            _draw_load(canvas, view, upper, scene, still)
         _draw_water(canvas, view, upper, scene, _NEAR, palette.NEAR_WATER, 0.55)
         darker = float(view.pixels([0.0, 0.0, scene.water.level - 2.0])[1])
         canvas.gradient(
@@ -52,7 +57,15 @@ def draw_side_view(canvas: Canvas, box: Box, scene: Scene, still: Scene | None =
         draw_hoist(canvas, view, scene)
         _draw_pulley_heave(canvas, view, upper, scene)
         cut = top + upper[3]
-        draw_hanging(canvas, view.pixels(scene.pulley), _on_rope(view, scene, cut), scene)
+        if not near:
+            draw_hanging(canvas, view.pixels(scene.pulley), _on_rope(view, scene, cut), scene)
+    if near:
+        with canvas.within(upper):
+            colour = palette.TARGET_IN_AIR if scene.target_level > scene.water.level else palette.TARGET
+            _draw_level(canvas, left, width, float(view.pixels([0.0, 0.0, scene.target_level])[1]), scene, colour)
+        _draw_captions(canvas, left, top, scene)
+        x, y = view.pixels(scene.load)
+        return float(x), float(y)
     lower = (left, top + upper[3], width, _BELOW)
     with canvas.within(lower):
         place = _draw_depth(canvas, lower, view, scene, still)
@@ -100,6 +113,30 @@ def _draw_pulley_heave(canvas: Canvas, view: View, box: Box, scene: Scene) -> No
     canvas.text(f"{scene.pulley_heave:+.2f} m", words, size=11, bold=True)
 
 
+def _draw_load(canvas: Canvas, view: View, box: Box, scene: Scene, still: Scene | None) -> None:
+    """Draw the load where it is, and the ground where that is as near."""
+    place = view.pixels(scene.load)
+    if math.isfinite(scene.ground):
+        left, top, width, height = box
+        ground = float(view.pixels([0.0, 0.0, scene.ground])[1]) + 0.5 * LOAD_SIZE
+        if ground < top + height:
+            canvas.box((left, ground, width, top + height - ground), palette.GROUND)
+    if not scene.parted:
+        draw_hanging(canvas, view.pixels(scene.pulley), place, scene)
+    if still is not None:
+        draw_ghost(canvas, view.pixels(still.load), LOAD_SIZE)
+    draw_load(canvas, place, LOAD_SIZE)
+
+
+def _draw_level(
+    canvas: Canvas, left: float, width: float, height: float, scene: Scene, colour: Colour = palette.TARGET
+) -> None:
+    """Draw the target level at a height in pixels."""
+    canvas.dashes((left, height), (left + width, height), colour, 1.2)
+    label = f"target level {scene.target_level:.1f} m"
+    canvas.text(label, (left + 14.0, height - 10.0), size=11, colour=colour)
+
+
 def _draw_depth(canvas: Canvas, box: Box, view: View, scene: Scene, still: Scene | None) -> FloatArray:
     """Draw the load about its target level, at the ship's scale; return the load's pixel."""
     left, top, width, height = box
@@ -118,15 +155,13 @@ def _draw_depth(canvas: Canvas, box: Box, view: View, scene: Scene, still: Scene
         canvas.text("seabed", (left + 14.0, min(ground + 12.0, top + height - 8.0)), size=11, colour=palette.PAGE)
     x = min(max(float(view.pixels(scene.load)[0]), left + 24.0), left + width - 24.0)
     place = np.array([x, level(scene)])
-    canvas.dashes((left, target), (left + width, target), palette.TARGET, 1.2)
+    _draw_level(canvas, left, width, target, scene)
     slope = _on_rope(view, scene, 0.0) - _on_rope(view, scene, 1.0)
     if not scene.parted:
         draw_hanging(canvas, place + slope * (place[1] - top), place, scene)
     if still is not None:
         draw_ghost(canvas, np.array([x, level(still)]), LOAD_SIZE)
     draw_load(canvas, place, LOAD_SIZE)
-    label = f"target level {scene.target_level:.1f} m"
-    canvas.text(label, (left + 14.0, target - 10.0), size=11, colour=palette.TARGET)
     return place
 
 

@@ -346,8 +346,8 @@ def simulate(case: DynamicCase | None = None, *, model: FrameModel | None = None
 
     Args:
         case: The run; default the paper's case with the drum still.
-        model: The frame's model, if it is not to be the default one (10 and 8 elements); where the scenario luffs, at
-            any luffing angle, best at :func:`aframe_env.rfem.luffed.middle_frame`.
+        model: The frame's model, if it is not to be the default one (10 and 8 elements); of a frame that luffs,
+            at its first luffing angle.
 
     Warns:
         SmallRotationWarning: An rfe turns by more than 0.05 rad.

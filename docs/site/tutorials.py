@@ -1,7 +1,7 @@
 """Pages of the tutorials, made of their scripts: ``python docs/site/tutorials.py`` runs them and writes the pages.
 
 A script in ``examples/tutorials`` has cells, as notebooks have: text behind ``# %% [markdown]``, code behind ``# %%``.
-Its page in ``docs/tutorials`` has the text, the code, and what the code printed.
+Its page in ``docs/tutorials`` has the text, the code, what the code printed, and the pictures that the text shows.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import contextlib
 import io
 import os
 import re
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable
@@ -24,6 +25,7 @@ TOLERANCE: Final = 2
 
 _CELL: Final = re.compile(r"^# %%(.*)\n", re.MULTILINE)
 _PRINTED: Final = re.compile(r"^```text\n.*?^```\n\n?", re.MULTILINE | re.DOTALL)
+_PICTURE: Final = re.compile(r"!\[[^]]*\]\(([^)/]+)\)")
 _NUMBER: Final = re.compile(r"(?<![\w.])-?\d[\d,]*(?:\.\d+)?")
 
 
@@ -115,9 +117,11 @@ def main() -> int:
     chosen = [Path(name).resolve() for name in sys.argv[1:]] or SCRIPTS
     sys.path.insert(0, os.getcwd())
     for script in chosen:
+        page_of(script).parent.mkdir(exist_ok=True)
         with tempfile.TemporaryDirectory() as folder:
             page = run(script, Path(folder))
-        page_of(script).parent.mkdir(exist_ok=True)
+            for picture in _PICTURE.findall(page):
+                shutil.copy(Path(folder) / picture, page_of(script).parent)
         page_of(script).write_text(page, encoding="utf-8")
         print(page_of(script).relative_to(ROOT))
     return 0

@@ -33,7 +33,7 @@ def test_a_page_has_its_script_s_text_and_code(script: Path) -> None:
 def test_every_page_has_a_script() -> None:
     pages = set((tutorials.ROOT / "docs/tutorials").glob("*.md"))
     assert pages == {tutorials.page_of(script) for script in tutorials.SCRIPTS}
-    assert len(pages) == 4
+    assert len(pages) == 5
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import RenderCollection
 
-from aframe_env import Crane, Harmonic, HarmonicMotion, InvalidValue, Rope, Scenario
+from aframe_env import Crane, Harmonic, HarmonicMotion, InvalidValue, Rope, Scenario, Winch
 from aframe_env.rendering.palette import INK, LOAD, WARNING
 from aframe_env.scenario import Frame
 
@@ -74,6 +74,21 @@ def test_load_is_seen_where_it_is() -> None:
     slope, _ = np.polyfit(errors, levels, 1)
     assert np.ptp(errors) > 2.0
     assert slope == pytest.approx(-11.0, rel=0.06)
+
+
+@pytest.mark.parametrize("level", [4.0, -3.0])
+def test_a_load_near_the_ship_is_seen_where_it_is(level: float) -> None:
+    winch = Winch(min_rope_length=1.0)
+    centres = []
+    for target in (level, level + 2.0):
+        env = make(scenario=Scenario(motion=HarmonicMotion(), target_level=target, crane=Crane(winch=winch)))
+        env.reset(seed=0)
+        centres.append(pixels_of(env.render()[SIDE_VIEW], LOAD).mean(axis=0))
+    (low, left), (high, right) = centres
+    assert low - high == pytest.approx(2.0 * 11.0, abs=0.6)
+    assert right == pytest.approx(left, abs=0.6)
+    # The deck's origin is 187 pixels below the view's upper edge.
+    assert low == pytest.approx(187.0 - level * 11.0, abs=1.5)
 
 
 def test_heave_lifts_the_ship() -> None:
