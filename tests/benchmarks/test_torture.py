@@ -30,6 +30,7 @@ def test_a_training_survives_kills(learner: str, tmp_path: Path) -> None:
     assert (row["tried"], row["survived"], row["failures"]) == (3, 3, [])
 
 
+@pytest.mark.slow
 def test_a_training_survives_a_full_disk(tmp_path: Path) -> None:
     outcome = full_disk.Filled("train.ppo", mounted=False).attempt(np.random.default_rng(1), tmp_path, 1)
     assert outcome.failures == ()

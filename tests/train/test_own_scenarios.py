@@ -109,6 +109,7 @@ def test_what_does_not_go_with_a_task_is_refused():
         LearningOptions(task="Calm")
 
 
+@pytest.mark.slow
 def test_optimisers_and_sensitivity_on_ones_own(own, tmp_path, monkeypatch):
     out = tmp_path / "optimisers"
     few = (

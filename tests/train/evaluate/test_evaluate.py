@@ -15,7 +15,9 @@ def command(monkeypatch, *arguments):
     return evaluate.main()
 
 
-@pytest.mark.parametrize(("model", "drives"), [("simplified", tuple(TUNED)), ("rfem", ("H-Ω1",))])
+@pytest.mark.parametrize(
+    ("model", "drives"), [("simplified", tuple(TUNED)), pytest.param("rfem", ("H-Ω1",), marks=pytest.mark.slow)]
+)
 def test_the_committed_agent_is_as_good_as_the_results_say(model, drives, tmp_path, monkeypatch):
     out = tmp_path / "out"
     few = ("--scenarios", 12, "--privileged", 0, "--no-report", "--out", out)

@@ -194,7 +194,9 @@ def wait_for_checkpoints(out: Path, count: int) -> None:
         time.sleep(0.01)
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+@pytest.mark.parametrize(
+    ("number", "status"), [pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow), (signal.SIGINT, 130)]
+)
 def test_a_signal_writes_a_checkpoint_and_says_so(number: int, status: int, tmp_path: Path, start: Start) -> None:
     process = started(start, tmp_path / "run")
     wait_for_checkpoints(tmp_path / "run", 1)

@@ -172,7 +172,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+@pytest.mark.parametrize("how", [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
 def test_a_driver_that_is_gone_loses_only_what_was_in_flight(
     how: signal.Signals, started: LocalCluster, tmp_path: Path, start: Callable[..., subprocess.Popen[str]]
 ) -> None:

@@ -14,10 +14,15 @@ from aframe_env.validation import InvalidValue
 from train.verify.__main__ import WATER_CHECKS, main
 from train.verify.rope_cases import COLUMNS, rope_case
 
+LONG = ("snap", "resonance")
 REFERENCE = files("aframe_env") / "data" / "reference" / "water"
 
 
-@pytest.mark.parametrize("check", WATER_CHECKS, ids=lambda check: check.__name__)
+@pytest.mark.parametrize(
+    "check",
+    [pytest.param(check, marks=pytest.mark.slow if check.__name__ in LONG else ()) for check in WATER_CHECKS],
+    ids=lambda check: check.__name__,
+)
 def test_every_check_holds(check) -> None:  # type: ignore[no-untyped-def]
     found = check()
     for one in found if isinstance(found, list) else [found]:
