@@ -25,7 +25,7 @@ from aframe_env.scenario import Scenario
 from aframe_env.simulation import Simulation
 from aframe_env.validation import InvalidValue
 from agents.control.interior_point import BoundedTracking
-from agents.control.inverse_dynamics import RequiredRope
+from agents.control.inverse_dynamics import InverseDynamics, RequiredRope
 from agents.control.winch import WinchModel
 from agents.policy import FloatArray, Knowledge
 
@@ -87,8 +87,10 @@ def optimise(
 ) -> Optimum:
     """Find the commands of least Ω1 in each scenario, on the task of ``config``.
 
-    ``start`` (N, n): commands to begin with, rad/s; by default what inverse dynamics asks for. ``progress`` is called
-    with the number of scenarios that are done.
+    ``start`` (N, n): commands to begin with, rad/s; by default what inverse dynamics asks for. On a heavy rope, where
+    there may be more minima than one and the steps go by a load that bobs without the rope's own waves, a drum left
+    still and the commands of the policy "inverse dynamics" are other starts, and the best end counts. ``progress`` is
+    called with the number of scenarios that are done.
     """
     config = config or TaskConfig()
     parts = []
@@ -97,13 +99,27 @@ def optimise(
         commands = required_commands(chosen, config) if start is None else start[begin : begin + CHUNK]
         if commands.shape != (len(chosen), config.steps):
             raise InvalidValue(f"start of shape {commands.shape}: must be ({len(chosen)}, {config.steps}), rad/s")
-        parts.append(_optimise(chosen, config, commands, rounds))
+        found = _optimise(chosen, config, commands, rounds)
+        if start is None and not all(scenario.is_light for scenario in chosen):
+            for other in (np.zeros_like(commands), _followed_commands(chosen, config)):
+                found = _better(found, _optimise(chosen, config, other, rounds))
+        parts.append(found)
         if progress is not None:
             progress(begin + len(chosen))
     return Optimum(
         np.concatenate([part.commands for part in parts]),
         np.concatenate([part.omega1 for part in parts]),
         np.concatenate([part.rounds for part in parts]),
+    )
+
+
+def _better(one: Optimum, other: Optimum) -> Optimum:
+    """The better of two for each scenario."""
+    first = one.omega1 <= other.omega1
+    return Optimum(
+        np.where(first[:, None], one.commands, other.commands),
+        np.minimum(one.omega1, other.omega1),
+        one.rounds + other.rounds,
     )
 
 
@@ -134,6 +150,19 @@ def saturating(scenarios: Sequence[Scenario], config: TaskConfig | None = None) 
     too_fast = abs(speed).max(axis=1) > [winch.max_rope_speed for winch in winches]
     too_sudden = abs(acceleration).max(axis=1) > [winch.max_rope_acceleration for winch in winches]
     return np.asarray(too_fast | too_sudden)
+
+
+def _followed_commands(scenarios: Sequence[Scenario], config: TaskConfig) -> FloatArray:
+    """Commands (N, n) rad/s of the policy "inverse dynamics", which looks at what has become of the load."""
+    policy, rows = InverseDynamics(), np.arange(len(scenarios))
+    simulation = Simulation(len(scenarios), config.replaced(scenario=scenarios[0], observation="state"))
+    simulation.reset_rows(rows, [(scenario, 0) for scenario in scenarios])
+    policy.reset(scenarios, config.control_period)
+    commands = np.empty((len(scenarios), config.steps))
+    for step in range(config.steps):
+        commands[:, step] = policy.act(simulation.observe(), step * config.control_period)
+        simulation.advance(commands[:, step])
+    return commands
 
 
 @dataclass
@@ -172,6 +201,10 @@ def _optimise(scenarios: Sequence[Scenario], config: TaskConfig, commands: Float
             break
         made[active] += 1
         chosen = [scenarios[i] for i in active.tolist()]
+        for i in active.tolist():
+            if scenarios[i].water is not None:
+                drag = _drag_rate(scenarios[i], best.error_rate[i])
+                model[:, i] = _rope_model(scenarios[i], config.control_period, drag)
         change = _gauss_newton(chosen, config, model[:, active], best.rows(active), number)
         wanted = np.concatenate([best.speed[active, 1:] + size * change for size in STEP_SIZES])
         many = chosen * len(STEP_SIZES)
@@ -245,12 +278,28 @@ def _gauss_newton(
     return np.asarray(np.cumsum(problem.solve()[0], axis=1))
 
 
-def _rope_model(scenario: Scenario, period: float) -> FloatArray:
-    """(2, 4, 4): transition of depth error, its rate, rope's end and pay-out speed over a step, and over half of it."""
+def _drag_rate(scenario: Scenario, velocity: FloatArray) -> float:
+    """Rate 1/s at which drag slows down what bobs as ``velocity`` (n,) m/s: that of the linear drag of as much work."""
+    square = float(np.sum(velocity**2))
+    if scenario.water is None or square == 0.0:
+        return 0.0
+    mean = float(np.sum(abs(velocity) ** 3)) / square
+    rope, length = scenario.crane.rope, scenario.lengths[0]
+    # Along the rope the speed falls from the load's to that of the still pulley, and the work with its cube.
+    area = scenario.load.drag_area_vertical + rope.tangential_drag * np.pi * rope.solid_diameter * length / 4.0
+    # A change of the velocity meets twice the drag that the velocity itself does.
+    return 2.0 * 0.5 * scenario.water.density * area * mean / scenario.moved_mass
+
+
+def _rope_model(scenario: Scenario, period: float, drag: float = 0.0) -> FloatArray:
+    """(2, 4, 4): transition of depth error, its rate, rope's end and pay-out speed over a step, and over half of it.
+
+    ``drag``: rate at which water slows the load down, 1/s.
+    """
     frequency = scenario.rope_frequency
     damping = scenario.total_rope_damping / critical_damping(scenario.rope_stiffness, scenario.moved_mass) * frequency
     rate = np.zeros((4, 4))
     rate[0, 1] = 1.0
-    rate[1] = -(frequency**2), -2.0 * damping, frequency**2, -2.0 * damping
+    rate[1] = -(frequency**2), -2.0 * damping - drag, frequency**2, -2.0 * damping
     rate[2, 3] = -1.0  # paying out lowers the rope's end
     return np.stack([expm(rate * period), expm(rate * 0.5 * period)])

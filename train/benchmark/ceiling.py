@@ -29,6 +29,7 @@ from train.shared.jobs import Where, run_jobs
 from train.shared.run_folder import versions, write_json
 
 FORMAT: Final = 1
+METHOD: Final = "Gauss-Newton on the drum's speeds under the winch's limits, whole future known"
 BLOCK: Final = 20
 """Scenarios of a job: what an interruption can cost."""
 SAME: Final = 1e-6
@@ -105,12 +106,13 @@ def ceiling_of(
         solved = run_jobs(
             _solve, blocks, store=store, where=where, progress=progress, description=f"{task.name}: ceiling"
         )
+    (scenario,) = task.scenarios(split, 1)
     return Ceiling(
         task=task.id,
         split=split,
         seed=task.seed(split),
         draws=draws,
-        method="Gauss-Newton on the drum's speeds under the winch's limits, whole future known",
+        method=METHOD if scenario.is_light else f"{METHOD}; the best end of three starts",
         still=_joined([each.still for each in solved]),
         best=_joined([each.best for each in solved]),
         versions=versions(),

@@ -12,11 +12,11 @@ import numpy as np
 
 from aframe_env.scenario import Scenario, Water
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion
+from aframe_env.suite.deep_rope import DEEP_CRANE, steel_load
 from agents.drives.functions import RampedDrive
 from agents.drives.map import DriveMap, Node, NodeDrive, ideal_ratio, optimise_node
 from agents.drives.objectives import Objective, coarse_step
 from agents.policy import FloatArray
-from train.deep_water.lifts import DEEP_CRANE, shape
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +35,7 @@ class WetNode(Node):
             target_level=self.crane.pulley_position[2] - self.length,
             initial="rest",
             water=Water(),
-            load=shape(self.mass),
+            load=steel_load(self.mass),
         )
 
 

@@ -12,11 +12,12 @@ import numpy.typing as npt
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario, Sea, SeaMotion, Sensors, Vessel, Water
 from aframe_env.scenario.target import TargetPath
+from aframe_env.suite.deep_rope import DEEP_CRANE, MANIFOLD, steel_load
 from agents.control.lowering import Following
 from agents.policy import DrumStill, FloatArray, Policy
 from agents.registry import BuildContext, choose
 from agents.rollout import run
-from train.deep_water.lifts import DEEP_CRANE, MANIFOLD, lifts, shape
+from train.deep_water.lifts import lifts
 
 START: Final = 25.0
 """Time at which the lowering begins, s."""
@@ -54,7 +55,7 @@ class Passage:
             target_level=DEEP_CRANE.pulley_position[2] - self.top,
             ramp=10.0,
             water=Water(),
-            load=shape(MANIFOLD),
+            load=steel_load(MANIFOLD),
             target_path=path,
         )
 
@@ -121,6 +122,6 @@ def running(error: FloatArray, window: int) -> FloatArray:
 
 def bobbing_periods(passage: Passage, depths: FloatArray) -> FloatArray:
     """Period [s] of the load's bobbing at depths (n,) m: the mass that moves on the rope's spring."""
-    rope, load = DEEP_CRANE.rope, shape(MANIFOLD)
+    rope, load = DEEP_CRANE.rope, steel_load(MANIFOLD)
     mass = MANIFOLD + load.added_mass_vertical + rope.mass_per_length * depths / 3.0
     return np.asarray(2.0 * np.pi * np.sqrt((depths + DEEP_CRANE.drum_to_pulley) * mass / rope.axial_stiffness))

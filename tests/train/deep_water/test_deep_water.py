@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aframe_env.suite.deep_rope import DEEP_CRANE, steel_load
 from aframe_env.validation import InvalidValue
 from train.deep_water.__main__ import Options
 from train.deep_water.harmonics import Grid, WetNode, find, left
-from train.deep_water.lifts import DEEP_CRANE, lifts, shape
+from train.deep_water.lifts import lifts
 from train.deep_water.passage import Passage, bobbing_periods, running
 from train.deep_water.zero_shot import ON_SENSORS, POLICIES, trials
 from train.shared.job_store import JobStore
@@ -44,8 +45,8 @@ def test_middles_lie_between_the_nodes() -> None:
 def test_loads_of_the_table_are_of_one_form() -> None:
     rng = np.random.default_rng(0)
     for scenario in (lifts(1000.0).draw(rng) for _ in range(5)):
-        assert scenario.load.volume == pytest.approx(shape(scenario.load_mass).volume)
-        assert scenario.load.drag_area_vertical == pytest.approx(shape(scenario.load_mass).drag_area_vertical)
+        assert scenario.load.volume == pytest.approx(steel_load(scenario.load_mass).volume)
+        assert scenario.load.drag_area_vertical == pytest.approx(steel_load(scenario.load_mass).drag_area_vertical)
         assert scenario.rope_length == pytest.approx(1000.0)
 
 
