@@ -139,6 +139,20 @@ def _law(make: Callable[[Sensors, ExpectedWaves], Policy]) -> PolicySpec:
     return PolicySpec(make(Sensors(), _ANY_WAVES).name, lambda context: make(context.sensors, context.waves))
 
 
+def _predictive(name: str, sensed: bool) -> PolicySpec:
+    def build(context: BuildContext) -> Policy:
+        heavy = not context.nominal.is_light
+        return PredictiveControl(
+            PlanningConfig(
+                sensors=context.sensors if sensed else None,
+                horizon=SLOW_HORIZON if heavy else PlanningConfig.horizon,
+                waves=context.waves,
+            )
+        )
+
+    return PolicySpec(name, build)
+
+
 def _optimum(context: BuildContext) -> Policy:
     return CommandSequence(OPTIMUM.name, optimise(context.scenarios, context.config).commands)
 
@@ -150,6 +164,9 @@ def _output_zero(observation: Literal["state", "sensors"], name: str) -> PolicyS
     return PolicySpec(name, build)
 
 
+SLOW_HORIZON: Final = 80
+"""Control steps that predictive control plans on a heavy rope, whose load bobs slowly. Against the 50 of light ropes it
+has 2 points more of the mean share, and 10 of that in the worst cases, on 40 validation scenarios of DeepRope."""
 DRUM_STILL: Final = PolicySpec("drum still", _drum_still)
 OPTIMUM: Final = PolicySpec("winch-limited optimum", _optimum)
 REGISTRY: Final[dict[str, PolicySpec]] = {
@@ -159,8 +176,8 @@ REGISTRY: Final[dict[str, PolicySpec]] = {
         *(_nominal_drive(name, how) for name, how in TUNED.items()),
         _law(lambda sensors, waves: Feedback(None, waves=waves)),
         _law(lambda sensors, waves: Feedback(sensors, waves=waves)),
-        _law(lambda sensors, waves: PredictiveControl(PlanningConfig(sensors=None, waves=waves))),
-        _law(lambda sensors, waves: PredictiveControl(PlanningConfig(sensors=sensors, waves=waves))),
+        _predictive("predictive control (state)", False),
+        _predictive("predictive control", True),
         _law(lambda sensors, waves: InverseDynamics()),
         _output_zero("state", "output zero"),
         _output_zero("sensors", "output zero on sensors"),
