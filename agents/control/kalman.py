@@ -204,20 +204,27 @@ class WaveFilter:
         return np.asarray(self._state[:, :-1] / self._exponent)
 
     def rate(self, times: FloatArray) -> FloatArray:
-        """Velocity (T, N) m/s of the pulley, ``times`` (T,) s after the latest reading's moment of measurement."""
-        return self._sum(np.exp(np.outer(times, self._exponent)))
+        """Velocity (T, N) m/s of the pulley, ``times`` s after the latest reading's moment of measurement.
+
+        Here and below (T,), the same for all rows, or (T, N).
+        """
+        return self._sum(np.exp(self._turns(times)))
 
     def acceleration(self, times: FloatArray) -> FloatArray:
         """Acceleration (T, N) m/s² of the pulley at these times."""
-        return self._sum(np.exp(np.outer(times, self._exponent)) * self._exponent)
+        return self._sum(np.exp(self._turns(times)) * self._exponent)
 
     def path(self, times: FloatArray) -> FloatArray:
         """Rise (T, N) m of the pulley since that moment."""
-        return self._sum(np.expm1(np.outer(times, self._exponent)) / self._exponent)
+        return self._sum(np.expm1(self._turns(times)) / self._exponent)
+
+    def _turns(self, times: FloatArray) -> ComplexArray:
+        """Exponents λ t, (T, 1 or N, bands)."""
+        return np.asarray((times if times.ndim == 2 else times[:, None])[:, :, None] * self._exponent)
 
     def _sum(self, factors: ComplexArray) -> FloatArray:
         # Row by row in the same order, whatever the batch: a sum, not a matrix product.
-        return np.asarray((factors[:, None, :] * self._state[None, :, :-1]).real.sum(axis=2))
+        return np.asarray((factors * self._state[None, :, :-1]).real.sum(axis=2))
 
 
 class _Kernels(NamedTuple):

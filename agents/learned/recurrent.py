@@ -55,12 +55,16 @@ class RecurrentCard:
     versions: dict[str, str]
     sha256: str
     """sha256 of the file of weights."""
+    adapts: bool = False
+    """Whether it reckons how much later than told readings and winch are."""
     format: int = FORMAT
 
     @property
     def made_for(self) -> LookoutConfig:
         """What its inputs are made for."""
-        return LookoutConfig(control_period=self.control_period, sensors=self.sensors, waves=self.waves)
+        return LookoutConfig(
+            control_period=self.control_period, sensors=self.sensors, waves=self.waves, adapts=self.adapts
+        )
 
     def network(self) -> RecurrentNetwork:
         """A network of this size, its weights still to be loaded."""
@@ -123,6 +127,7 @@ class RecurrentPolicy:
                 lookout.gains,
                 lookout.most_change,
                 lookout.most_speed,
+                lookout.lag,
             )
         )
         shares = []

@@ -15,15 +15,17 @@ import numpy as np
 import numpy.typing as npt
 
 from aframe_env.config import TaskConfig
-from aframe_env.scenario import ScenarioDistribution
+from aframe_env.scenario import ScenarioDistribution, ScenarioSource
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
+from aframe_env.validation import InvalidValue
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import FloatArray
 from agents.control.lift import Lift
 from agents.control.observer import observer_for
 from agents.control.regulator import Columns, HoistBatch, Observation
 from agents.learned.features import DAMPING_RATIO, lift_features, winch_features
+from agents.learned.lateness import Lateness
 
 Float32Array = npt.NDArray[np.float32]
 
@@ -48,21 +50,39 @@ class LookoutConfig:
     """Sensors that measure the observation; None where the full state is observed."""
     waves: ExpectedWaves = field(default_factory=lambda: ExpectedWaves.of(ScenarioDistribution()))
     """Motion of the pulley that is expected."""
+    adapts: bool = False
+    """Reckon how much later than told readings and winch are, and look that much further ahead; on sensors alone."""
+
+    def __post_init__(self) -> None:
+        if self.adapts and self.sensors is None:
+            raise InvalidValue("adapts = True: it takes sensors, and the full state is observed: must be False")
 
     @classmethod
     def of(cls, task: TaskConfig) -> LookoutConfig:
         """For the agents of a task."""
-        return cls(control_period=task.control_period, sensors=task.sensors, waves=ExpectedWaves.of(task.source))
+        return cls(
+            control_period=task.control_period,
+            sensors=task.sensors,
+            waves=ExpectedWaves.of(task.source),
+            adapts=task.sensors is not None and _is_late(task.source),
+        )
 
     @property
     def readings(self) -> tuple[str, ...]:
         """Quantities beside the forecasts, each by its unit's scale."""
-        return tuple(_SENSED_SCALES if self.sensors else _STATE_SCALES)
+        return tuple(_SENSED_SCALES if self.sensors else _STATE_SCALES) + ("lateness",) * self.adapts
 
 
 _SENSED_SCALES: Final = {"pulley_velocity_z": 1.0, "pulley_heave": 0.5, "roll": 10.0, "pitch": 10.0}
 _STATE_SCALES: Final = {"pulley_velocity_z": 1.0, "pulley_heave": 0.5, "pulley_acceleration_z": 1.0}
 _SURPRISE_SCALE: Final = 10.0
+_LATENESS_SCALE: Final = 5.0
+
+
+def _is_late(source: ScenarioSource) -> bool:
+    """Whether winches or readings may be later than told."""
+    told = None if source.told is None else source.told.lag
+    return source.sensor_delay is not None or told is not None
 
 
 class Outlook(NamedTuple):
@@ -73,9 +93,9 @@ class Outlook(NamedTuple):
     z: FloatArray
     """(N, 4) estimated state of ``RopeModel``."""
     rise: FloatArray
-    """(N,) foretold mean speed of the pulley over the coming control step, m/s."""
+    """(N,) foretold mean speed of the pulley over the coming control step, m/s; at its end, where the winch lags."""
     speed: FloatArray
-    """(N,) of the rope at the drum, paid out, m/s."""
+    """(N,) of the rope at the drum, paid out, m/s; on sensors as reckoned from the commands, all being as told."""
 
 
 class Lookout:
@@ -90,6 +110,8 @@ class Lookout:
         delay = 0.0 if config.sensors is None else round(config.sensors.delay / self._period) * self._period
         self._rates_at = delay + np.array(RATES_AHEAD)
         self._rises_at = delay + np.array((0.0, *RISES_AHEAD))
+        self._step_at = delay + np.array((0.0, self._period))
+        self._lateness = Lateness(rows, self._period, round(delay / self._period)) if config.adapts else None
         self._turned = np.zeros(rows)
         self.figures = np.zeros((rows, len(FIGURES)), dtype=np.float32)
         """(N, F) ``FIGURES``."""
@@ -100,6 +122,11 @@ class Lookout:
     def most_speed(self) -> FloatArray:
         """(N,) greatest speed of the rope at the drum, m/s."""
         return self._hoists.winch.radius * self._hoists.winch.max_speed
+
+    @property
+    def lag(self) -> FloatArray:
+        """(N,) of the winches, in control steps."""
+        return self._hoists.winch.lag / self._period
 
     @property
     def most_change(self) -> FloatArray:
@@ -132,13 +159,19 @@ class Lookout:
         """Take the observations (N, K), one control step later."""
         o = self._hoists.columns(observation)
         foretold = self._observer.waves.rate(np.array([self._period]))[0]
+        if self._lateness is not None:
+            radius = self._hoists.winch.radius
+            self._lateness.advance(radius * self._hoists.winch.speed, radius * o["drum_speed"])
         self._observer.advance(self._turned, o)
         return self._look(o, o["pulley_velocity_z"] - foretold)
 
     def command(self, share: FloatArray) -> FloatArray:
-        """Drum speed commands (N,) rad/s: change the speed by this share (N,) of what the winch can in a step."""
+        """Drum speed commands (N,) rad/s: change the speed by this share (N,) of what the winch can in a step.
+
+        A winch with a lag ramps all through the step where the command is ahead by what it would gain over its lag, too.
+        """
         winch = self._hoists.winch
-        wanted = winch.speed + self._period * winch.max_acceleration * np.clip(share, -1.0, 1.0)
+        wanted = winch.speed + (self._period + winch.lag) * winch.max_acceleration * np.clip(share, -1.0, 1.0)
         command = np.clip(wanted, -winch.max_speed, winch.max_speed)
         return self.follow(command)
 
@@ -148,14 +181,23 @@ class Lookout:
         return command
 
     def _look(self, o: Columns, surprise: FloatArray) -> Outlook:
-        waves, winch = self._observer.waves, self._hoists.winch
-        path = waves.path(self._rises_at)
+        waves, winch, lateness = self._observer.waves, self._hoists.winch, self._lateness
+        rates_at, rises_at, step_at = self._rates_at, self._rises_at, self._step_at
+        if lateness is not None:
+            rates_at, rises_at, step_at = (each[:, None] + lateness.seconds for each in (rates_at, rises_at, step_at))
+        path = waves.path(rises_at)
         series = (
-            *waves.rate(self._rates_at),
+            *waves.rate(rates_at),
             *(path[1:] - path[0]),
             *(scale * o[name] for name, scale in self._scales.items()),
+            *(() if lateness is None else (_LATENESS_SCALE * lateness.seconds,)),
             _SURPRISE_SCALE * surprise,
         )
         z = self._observer.state()
         rise = self._observer.rises(1)[0] / self._period
-        return Outlook(np.stack(series, axis=1).astype(np.float32), z, rise, winch.radius * winch.speed)
+        speed, rope_speed = waves.rate(step_at), winch.radius * winch.speed
+        if lateness is not None:
+            z[:, 3] = speed[0] - rope_speed
+            rise = np.diff(waves.path(step_at), axis=0)[0] / self._period
+        rise = np.where(winch.lag > 0.0, speed[1], rise)
+        return Outlook(np.stack(series, axis=1).astype(np.float32), z, rise, rope_speed)

@@ -45,15 +45,17 @@ class Load(NamedTuple):
     z: torch.Tensor
     """(B, 4) estimated state of ``RopeModel``."""
     rise: torch.Tensor
-    """Foretold mean speed of the pulley over the coming control step, m/s."""
+    """Foretold mean speed of the pulley over the coming control step, m/s; at its end, where the winch lags."""
     speed: torch.Tensor
-    """Of the rope at the drum, paid out, m/s."""
+    """Of the rope at the drum, paid out, m/s, as reckoned."""
     gains: torch.Tensor
     """(B, 4) of the regulator."""
     most_change: torch.Tensor
     """Greatest change of the rope's speed in a control step, m/s."""
     most_speed: torch.Tensor
     """m/s."""
+    lag: torch.Tensor
+    """Of the winch, in control steps."""
 
 
 class RecurrentNetwork(nn.Module):
@@ -123,8 +125,9 @@ class RecurrentNetwork(nn.Module):
         hidden = nn.functional.silu(prepared + self.of_load(of_load))
         weight, correction, push = self.last(nn.functional.silu(self.second(hidden))).unbind(-1)
         goal = load.rise - torch.sigmoid(weight + 1.0) * p.clamp(-0.5, 0.5) - 0.5 * correction
-        share: torch.Tensor = change_for((goal - load.speed) / change) + 2.0 * push
-        return share
+        wanted = (goal - load.speed) / change
+        share = torch.where(load.lag > 0.0, change_in_lag(wanted, load.lag), change_for(wanted))
+        return share + 2.0 * push
 
 
 def change_for(mean: torch.Tensor) -> torch.Tensor:
@@ -137,3 +140,17 @@ def change_for(mean: torch.Tensor) -> torch.Tensor:
     within = 1.0 - torch.sqrt((1.0 - twice).clamp(min=0.04))
     beyond = (0.8 + 2.5 * (twice - 0.96)).clamp(max=1.3)
     return torch.where(twice < 0.96, within, beyond) * mean.sign()
+
+
+def change_in_lag(reached: torch.Tensor, lag: torch.Tensor) -> torch.Tensor:
+    """Share of a command's change beyond which a winch that lags gains no more, for a change that is reached in a step.
+
+    ``reached`` as a share of what the winch can, ``lag`` in control steps: commands within ``lag`` times what it can in
+    a step are approached exponentially, and one that is further off by up to a step's change ramps for part of it.
+    Beyond what can be reached it goes on linearly, to 1.3 at the most.
+    """
+    size, near = reached.abs(), lag / (1.0 + lag)
+    slowly = lag * -torch.expm1(-1.0 / lag.clamp(min=1e-3))
+    within = near * size / slowly.clamp(min=1e-6)
+    beyond = near + (1.0 - near) * (size - slowly) / (1.0 - slowly).clamp(min=1e-3)
+    return torch.where(size < slowly, within, beyond.clamp(max=1.3)) * reached.sign()

@@ -7,7 +7,7 @@ they serve whatever a network does in their place (``train.apg.twin``).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Final
 
 import numpy as np
@@ -45,6 +45,8 @@ class Recordings:
 
     period: float
     """Control step, s."""
+    observed: bool
+    """Whether the drum's speed is observed, and not reckoned from the commands."""
     series: Array
     """(N, n, S) of ``Outlook``."""
     figures: Array
@@ -55,10 +57,12 @@ class Recordings:
     """(N,) greatest change of the rope's speed at the drum in a step, as told, m/s."""
     told_speed: Array
     """(N,) greatest speed of the rope at the drum, as told, m/s."""
+    told_lag: Array
+    """(N,) of the winch, as told, in control steps."""
     error: Array
-    """(N, n, 4) estimated less true state of ``RopeModel``."""
+    """(N, n, 4) estimated less true state of ``RopeModel``; its last as if the drum's speed were as reckoned."""
     rise: Array
-    """(N, n) foretold mean speed of the pulley over the coming step, m/s."""
+    """(N, n) foretold speed of the pulley in the coming step, as in ``Outlook``, m/s."""
     path: Array
     """(N, n + 1 + PREVIEW) length of rope since the start that would hold the load still, m."""
     path_speed: Array
@@ -70,7 +74,9 @@ class Recordings:
     most_change: Array
     """(N,) what is true of ``told_change``."""
     most_speed: Array
-    """(N,) and of ``told_speed``."""
+    """(N,) and of ``told_speed``,"""
+    lag: Array
+    """(N,) and of ``told_lag``."""
     still: Array
     """(N,) root mean square depth error with the drum left still, m."""
     best: Array
@@ -78,17 +84,18 @@ class Recordings:
 
     def rows(self, which: npt.NDArray[np.int64] | slice) -> Recordings:
         """Some of the episodes."""
-        return Recordings(self.period, **{name: array[which] for name, array in self.arrays().items()})
+        return replace(self, **{name: array[which] for name, array in self.arrays().items()})
 
     def arrays(self) -> dict[str, Array]:
-        """All but the period, by name."""
-        return {each.name: getattr(self, each.name) for each in fields(self) if each.name != "period"}
+        """All that there is of each episode, by name."""
+        names = (each.name for each in fields(self) if each.name not in ("period", "observed"))
+        return {name: getattr(self, name) for name in names}
 
     @classmethod
     def joined(cls, parts: Sequence[Recordings]) -> Recordings:
         """The episodes of all parts, one after the other."""
         names = parts[0].arrays()
-        return cls(parts[0].period, **{name: np.concatenate([part.arrays()[name] for part in parts]) for name in names})
+        return replace(parts[0], **{name: np.concatenate([part.arrays()[name] for part in parts]) for name in names})
 
     def model(self) -> RopeModel:
         """True model of the loads on their ropes."""
@@ -111,10 +118,6 @@ def require_linear(scenarios: Sequence[Scenario]) -> None:
     for scenario in scenarios:
         if not scenario.is_light:
             raise InvalidValue("a heavy rope, water or a target that moves: the twin of train.apg knows none of them")
-        if scenario.crane.winch.lag:
-            raise InvalidValue(f"lag = {scenario.crane.winch.lag:g} s: must be 0 s for the twin of train.apg")
-        if scenario.as_told.crane.winch != scenario.crane.winch:
-            raise InvalidValue("a winch that is not as told: must be as told for the twin of train.apg")
 
 
 def required_path(scenarios: Sequence[Scenario], period: float, steps: int) -> tuple[FloatArray, FloatArray]:
@@ -147,7 +150,7 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
         outlook = lookout.advance(seen) if step else lookout.start(seen, [each.as_told for each in scenarios])
         true = simulation.state
         rope_end = path[:, step] - radius * true[:, task.DRUM_ANGLE]
-        rope_end_speed = path_speed[:, step] - radius * true[:, task.DRUM_SPEED]
+        rope_end_speed = path_speed[:, step] - outlook.speed
         z = [true[:, task.DEPTH_ERROR], true[:, task.LOAD_VELOCITY_Z], rope_end, rope_end_speed]
         series.append(outlook.series)
         error[:, step] = outlook.z - np.stack(z, axis=1)
@@ -157,11 +160,13 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
     winches = [scenario.crane.winch for scenario in scenarios]
     recordings = Recordings(
         period=period,
+        observed=config.sensors is None,
         series=np.stack(series, axis=1),
         figures=lookout.figures,
         gains=lookout.gains,
         told_change=lookout.most_change,
         told_speed=lookout.most_speed,
+        told_lag=lookout.lag,
         error=error.astype(np.float32),
         rise=rise.astype(np.float32),
         path=path,
@@ -172,6 +177,7 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
         ),
         most_change=np.array([winch.max_rope_acceleration * period for winch in winches]),
         most_speed=np.array([winch.max_rope_speed for winch in winches]),
+        lag=np.array([winch.lag / period for winch in winches]),
         still=still.rms,
         best=best,
     )

@@ -20,7 +20,7 @@ from train.apg.twin import roll_out
 Report = Callable[[str], object]
 """Is told a figure after each step."""
 Labels = dict[str, Array]
-"""``episode``, ``step``, ``z``, ``speed`` and ``share`` (M, …): what ``Teacher.share`` takes and gives."""
+"""``episode``, ``step``, ``z``, ``speed``, ``reckoned`` and ``share`` (M, …): what ``Teacher.share`` takes and gives."""
 
 RISES_WEIGHT: Final = 0.3
 """Weight of a rise's squared error, m², beside that of a rate, m²/s²."""
@@ -62,21 +62,20 @@ def fit_forecaster(network: RecurrentNetwork, recordings: Recordings, options: A
 def ask_teacher(network: RecurrentNetwork, recordings: Recordings, options: ApgOptions, number: int) -> Labels:
     """Let the network act on the twin, and the teacher say what would have been best, in round ``number``."""
     rng = np.random.default_rng([options.seed, 2, number])
-    states, speeds = [], []
     with torch.no_grad():
-        for rows in _chunks(len(recordings.still)):
-            visited = roll_out(network, recordings.rows(rows), keep=True)
-            states.append(visited.z.numpy())
-            speeds.append(visited.speed.numpy())
-    z, speed = np.concatenate(states), np.concatenate(speeds)
+        visited = [roll_out(network, recordings.rows(rows), keep=True) for rows in _chunks(len(recordings.still))]
+    z, speed, reckoned = (
+        np.concatenate([getattr(each, name).numpy() for each in visited]) for name in ("z", "speed", "reckoned")
+    )
     place = rng.permutation(speed.size)[: options.labels]
     episode, step = np.divmod(place, speed.shape[1])
     near = abs(z[episode, step, 0]) < FARTHEST
     episode, step = episode[near], step[near]
-    z, speed = z[episode, step], speed[episode, step]
-    share = Teacher(recordings).share(episode, step, z.astype(np.float64), speed.astype(np.float64))
+    z, speed, reckoned = z[episode, step], speed[episode, step], reckoned[episode, step]
+    states = (each.astype(np.float64) for each in (z, speed, reckoned))
+    share = Teacher(recordings).share(episode, step, *states).astype(np.float32)
     said = np.isfinite(share)
-    labels = {"episode": episode, "step": step, "z": z, "speed": speed, "share": share.astype(np.float32)}
+    labels = {"episode": episode, "step": step, "z": z, "speed": speed, "reckoned": reckoned, "share": share}
     return {name: array[said] for name, array in labels.items()}
 
 
@@ -107,13 +106,17 @@ def imitate(
     for step in range(options.imitation_steps):
         some = torch.from_numpy(rng.integers(len(labels["share"]), size=options.imitation_batch))
         episode, at = labels["episode"][some], labels["step"][some]
+        # The true state's last is the rope end's speed with the drum as it turns; the agent's, with it as reckoned.
+        z = labels["z"][some] + r["error"][episode, at]
+        z[:, 3] += labels["speed"][some] - labels["reckoned"][some]
         seen = Load(
-            labels["z"][some] + r["error"][episode, at],
+            z,
             r["rise"][episode, at],
-            labels["speed"][some],
+            labels["reckoned"][some],
             r["gains"][episode],
             r["told_change"][episode],
             r["told_speed"][episode],
+            r["told_lag"][episode],
         )
         share = network.share(network.prepare(context[episode, at].float()), seen)
         loss = ((clip_one_sided(share, torch.ones_like(share)) - labels["share"][some]) ** 2).mean()

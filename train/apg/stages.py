@@ -59,6 +59,7 @@ def to_policy(network: RecurrentNetwork, options: ApgOptions) -> tuple[Recurrent
         seed=options.seed,
         versions=versions(),
         sha256=digest(weights),
+        adapts=config.adapts,
     )
     return RecurrentPolicy(network, card), weights
 
@@ -103,7 +104,7 @@ class Training:
             for first in range(0, options.episodes, BLOCK):
                 count = min(BLOCK, options.episodes - first)
                 arrays = self._kept(f"recordings-{first}", partial(self._block, first, count))
-                parts.append(Recordings(options.config.control_period, **arrays))
+                parts.append(Recordings(options.config.control_period, options.config.sensors is None, **arrays))
                 report(f"{len(parts[-1].still)} of use", count)
         return Recordings.joined(parts)
 

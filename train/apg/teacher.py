@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from agents.control.predictive import bounded_problem
+from agents.control.winch import WinchModel
 from agents.policy import FloatArray
 from train.apg.data import PREVIEW, Recordings
 
@@ -28,12 +29,17 @@ class Teacher:
         self._cost_to_go = self._model.costs_to_go(np.full(len(recordings.still), EFFORT))
 
     def share(
-        self, episode: npt.NDArray[np.int64], step: npt.NDArray[np.int64], z: FloatArray, speed: FloatArray
+        self,
+        episode: npt.NDArray[np.int64],
+        step: npt.NDArray[np.int64],
+        z: FloatArray,
+        speed: FloatArray,
+        reckoned: FloatArray,
     ) -> FloatArray:
         """Change (M,) of the rope's speed over a step, as a share of what the winch can, from states that were visited.
 
         ``episode`` and ``step`` (M,): where; ``z`` (M, 4) true states of ``RopeModel``, ``speed`` (M,) of the rope at
-        the drum, m/s. NaN where the problem has no answer.
+        the drum, m/s, and what the agent reckons it to be. NaN where the problem has no answer.
         """
         r = self._recordings
         ahead = step[:, None] + np.arange(PREVIEW + 1)
@@ -48,8 +54,25 @@ class Teacher:
             effort=EFFORT,
             cost_to_go=self._cost_to_go[episode],
         )
-        first = problem.solve()[0][:, 0]
-        mean = pulley[:, 0] - z[:, 3] - first - speed
+        # Mean speeds of the drum over this step and the next one.
+        mean = pulley[:, :2] - z[:, 3:] - np.cumsum(problem.solve()[0][:, :2], axis=1)
         # The drum ramps up at once, and then holds: 2 |mean| = most (1 - (1 - share)²).
-        reached = np.clip(2.0 * mean / r.most_change[episode], -1.0, 1.0)
-        return np.asarray(np.sign(reached) * (1.0 - np.sqrt(1.0 - abs(reached))))
+        most = r.most_change[episode]
+        reached = np.clip(2.0 * (mean[:, 0] - speed) / most, -1.0, 1.0)
+        command = speed + most * np.sign(reached) * (1.0 - np.sqrt(1.0 - abs(reached)))
+        late = np.flatnonzero(r.lag[episode] > 0.0)
+        command[late] = self._reach(episode[late], speed[late], 0.5 * mean[late].sum(axis=1))
+        ahead_by = (1.0 + r.told_lag[episode]) * r.told_change[episode]
+        return np.asarray(np.clip((command - reckoned) / ahead_by, -1.0, 1.0))
+
+    def _reach(self, episode: npt.NDArray[np.int64], speed: FloatArray, wanted: FloatArray) -> FloatArray:
+        """Commands (M,) after which ropes are paid out at ``wanted`` at the step's end, all m/s.
+
+        What a winch that lags can is what one without lag can, as long as its commands go ahead by as much.
+        """
+        r = self._recordings
+        winch = WinchModel(len(speed), r.period)
+        winch.speed[:] = speed
+        winch.max_speed[:], winch.max_acceleration[:] = r.most_speed[episode], r.most_change[episode] / r.period
+        winch.lag[:] = r.lag[episode] * r.period
+        return winch.reach(wanted)

@@ -1,13 +1,14 @@
 """The linear twin: load on its rope and winch of many lifts, in torch, so that a score can be differentiated.
 
-The load answers the rope's end as ``agents.control.rope.RopeModel`` has it, the drum ramps up to its new speed at the
-winch's greatest acceleration and holds it, and the pulley goes its true way, which the engine told. What is left out is
-the rope's going slack, the swinging of the load while it is not where it should be, and the drum's ramp within a step:
-``tests/train/apg/test_twin.py`` holds what that makes against the engine.
+The load answers the rope's end as ``agents.control.rope.RopeModel`` has it, the drum follows its command within the
+winch's greatest acceleration and with its lag, and the pulley goes its true way, which the engine told. What is left
+out is the rope's going slack, the swinging of the load while it is not where it should be, and the drum's ramp within a
+step: ``tests/train/apg/test_twin.py`` holds what that makes against the engine.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,32 +19,81 @@ from train.apg.data import Recordings
 
 
 @dataclass(frozen=True)
+class Winches:
+    """Drums that follow their commands, in closed form over a control step, as ``aframe_env.dynamics.drum``.
+
+    All tensors of one shape (…,), that of the commands.
+    """
+
+    most_change: torch.Tensor
+    """Greatest change of the rope's speed at the drum in a step, m/s."""
+    most_speed: torch.Tensor
+    """m/s."""
+    lag: torch.Tensor
+    """Time constant, in control steps."""
+
+    def follow(self, speed: torch.Tensor, command: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Mean speed of the rope over a step, m/s, and its speed at the end, from ``speed`` at its beginning."""
+        most, lag = self.most_change, self.lag
+        gap = clip_one_sided(command, self.most_speed) - speed
+        size = gap.abs()
+        # Within most x lag of its command a drum approaches it exponentially, from further off it ramps up first.
+        nearby = torch.minimum(size, most * lag)
+        ramp = ((size - nearby) / most).clamp(max=1.0)
+        rest = 1.0 - ramp
+        come = -torch.expm1(-rest / lag.clamp(min=1e-6))
+        gained = most * ramp
+        reached = gained + nearby * come
+        mean = gained * (0.5 * ramp + rest) + nearby * (rest - lag * come)
+        sign = gap.sign()
+        return speed + sign * mean, speed + sign * reached
+
+
+@dataclass(frozen=True)
 class Twin:
-    """Lifts of B rows."""
+    """Lifts of B rows.
+
+    Their drums are (D, B): those that turn and, where they are not what was told and their speed is not observed, those
+    that the agent reckons with in their place.
+    """
 
     transition: torch.Tensor
     """(B, 3, 4): depth error, its rate and the rope's end after a step, of these and of its mean speed."""
-    most_change: torch.Tensor
-    """(B,) greatest change of the rope's speed at the drum in a step, m/s."""
-    most_speed: torch.Tensor
-    """(B,) m/s."""
+    winches: Winches
+    """(D, B)."""
+    reach: torch.Tensor
+    """(B,) what a command is ahead of the reckoned speed for a share of 1, m/s, as told."""
+    told_speed: torch.Tensor
+    """(B,) greatest speed of the rope at the drum, as told, m/s."""
     period: float
     """Control step, s."""
+
+    @classmethod
+    def of(cls, recordings: Recordings, tensors: Mapping[str, torch.Tensor]) -> Twin:
+        """Of recorded lifts, whose ``tensors`` are those of the recordings."""
+        r = tensors
+        pairs = [(r["most_change"], r["told_change"]), (r["most_speed"], r["told_speed"]), (r["lag"], r["told_lag"])]
+        alike = recordings.observed or all(torch.equal(true, told) for true, told in pairs)
+        winches = Winches(*(torch.stack((true,) if alike else (true, told)) for true, told in pairs))
+        reach = (1.0 + r["told_lag"]) * r["told_change"]
+        return cls(r["transition"], winches, reach, r["told_speed"], recordings.period)
+
+    def start(self) -> tuple[torch.Tensor, torch.Tensor]:
+        """State (B, 3) and speeds (D, B) of lifts that hang at rest."""
+        return self.transition.new_zeros(self.transition.shape[:2]), torch.zeros_like(self.winches.lag)
 
     def advance(
         self, state: torch.Tensor, speed: torch.Tensor, share: torch.Tensor, rise: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Take a control step: state (B, 3) and the rope's speed (B,) m/s at its end.
+        """Take a control step: state (B, 3) and the rope's speeds (D, B) m/s at its end.
 
         ``share`` (B,): change of the speed that is asked for, as a share of what the winch can; ``rise`` (B,) m of the
         length of rope that would hold the load still.
         """
-        asked = speed + self.most_change * clip_one_sided(share, torch.ones_like(share))
-        reached = clip_one_sided(asked, self.most_speed)
-        change = reached - speed
-        # It ramps up at once, and then holds.
-        mean = reached - change * change.abs() / (2.0 * self.most_change)
-        moved = torch.cat([state, (rise / self.period - mean)[:, None]], dim=1)
+        asked = speed[-1] + self.reach * clip_one_sided(share, torch.ones_like(share))
+        command = clip_one_sided(asked, self.told_speed)
+        mean, reached = self.winches.follow(speed, command.expand_as(speed))
+        moved = torch.cat([state, (rise / self.period - mean[0])[:, None]], dim=1)
         return (self.transition @ moved[:, :, None])[:, :, 0], reached
 
 
@@ -56,6 +106,8 @@ class Rollout(NamedTuple):
     """(B, n, 4) true states of ``RopeModel`` at the steps' starts; (B, 0, 4) where they were not kept."""
     speed: torch.Tensor
     """(B, n) of the rope at the drum, m/s; likewise."""
+    reckoned: torch.Tensor
+    """(B, n) the same as the agent reckons it."""
 
 
 def roll_out(network: RecurrentNetwork, recordings: Recordings, *, keep: bool = False) -> Rollout:
@@ -65,24 +117,33 @@ def roll_out(network: RecurrentNetwork, recordings: Recordings, *, keep: bool = 
     waves and noise, hardly from what the drum does.
     """
     r = recordings.tensors()
-    twin = Twin(r["transition"], r["most_change"], r["most_speed"], recordings.period)
+    twin = Twin.of(recordings, r)
     context, _ = network.remember(r["series"], r["figures"])
     prepared = network.prepare(context).unbind(1)
     rise = r["path"].diff(dim=1)
     count, steps = r["rise"].shape
-    state, speed = rise.new_zeros(count, 3), rise.new_zeros(count)
+    state, speed = twin.start()
     square, states, speeds = rise.new_zeros(count), [], []
     for step in range(steps):
-        z = torch.cat([state, (r["path_speed"][:, step] - speed)[:, None]], dim=1)
+        rope_end = r["path_speed"][:, step] - speed
         if keep:
-            states.append(z)
+            states.append(torch.cat([state, rope_end[0, :, None]], dim=1))
             speeds.append(speed)
-        seen = Load(z + r["error"][:, step], r["rise"][:, step], speed, r["gains"], r["told_change"], r["told_speed"])
+        z = torch.cat([state, rope_end[-1, :, None]], dim=1)
+        seen = Load(
+            z + r["error"][:, step],
+            r["rise"][:, step],
+            speed[-1],
+            r["gains"],
+            r["told_change"],
+            r["told_speed"],
+            r["told_lag"],
+        )
         before = state[:, 0]
         state, speed = twin.advance(state, speed, network.share(prepared[step], seen), rise[:, step])
         square = square + 0.5 * (before**2 + state[:, 0] ** 2)
-    return Rollout(
-        torch.sqrt(square / steps + 1e-12),
-        torch.stack(states, dim=1) if keep else rise.new_zeros(count, 0, 4),
-        torch.stack(speeds, dim=1) if keep else rise.new_zeros(count, 0),
-    )
+    rms = torch.sqrt(square / steps + 1e-12)
+    if not keep:
+        return Rollout(rms, rise.new_zeros(count, 0, 4), *rise.new_zeros(2, count, 0))
+    kept = torch.stack(speeds, dim=-1)
+    return Rollout(rms, torch.stack(states, dim=1), kept[0], kept[-1])
