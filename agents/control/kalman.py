@@ -358,6 +358,8 @@ class RopeFilter:
         self._process_noise, self._covariance = np.zeros((rows, 4, 4)), np.zeros((rows, 4, 4))
         self._noise = np.ones(rows)
         self._x = np.zeros((rows, 4))
+        self.gain = np.zeros((rows, 4))
+        """(N, 4) of the latest reading of the stretch."""
 
     def start(self, model: RopeModel, period: float, stretch_noise: FloatArray, rows: Rows = ALL) -> None:
         """Begin in these rows with loads at rest; ``stretch_noise`` (n,) of a reading of the stretch, m."""
@@ -390,7 +392,7 @@ class RopeFilter:
         p = a @ self._covariance @ a.transpose(0, 2, 1) + self._process_noise
         cross_covariance = p[:, :, 2] - p[:, :, 0] + p[:, :, 3]
         seen = cross_covariance[:, 2] - cross_covariance[:, 0] + cross_covariance[:, 3]
-        gain = cross_covariance / (seen + self._noise)[:, None]
+        self.gain = gain = cross_covariance / (seen + self._noise)[:, None]
         self._x = x + gain * (stretch - (x[:, 2] - x[:, 0] + x[:, 3]))[:, None]
         self._covariance = p - gain[:, :, None] * cross_covariance[:, None, :]
 

@@ -35,7 +35,7 @@ class KalmanObserver:
         bank = WaveBank.of(waves, sensors)
         self._tension = sensors.tension
         self.waves = WaveFilter(rows, hoists.period, hold, bank)
-        self._rope = RopeFilter(rows, bank.rate_noise)
+        self.load = RopeFilter(rows, bank.rate_noise)
         self._heave_rate, self._drum_angle, self._first_angle, self._depth_error = np.zeros((4, rows))
 
     def start(self, o: Columns, rows: Rows = ALL) -> None:
@@ -47,7 +47,7 @@ class KalmanObserver:
     def retune(self, longer: FloatArray) -> None:
         """Go on with the hoists as they are now, the ropes ``longer`` (N,) by that factor; what is known stays."""
         self.model.replace(ALL, self._hoists.model(self._damping_ratio))
-        self._rope.retune(self.model, self._hoists.period, self._stretch_noise(ALL), longer)
+        self.load.retune(self.model, self._hoists.period, self._stretch_noise(ALL), longer)
 
     def advance(self, turned: FloatArray, o: Columns) -> None:
         """Take the readings a control step later, during which the drums turned by ``turned`` (N,) rad."""
@@ -59,8 +59,8 @@ class KalmanObserver:
         """State z (N, 4) of the rope's model, now."""
         hoists, still = self._hoists, np.zeros(len(self._hoists.frequency))
         rises = np.diff(self.waves.path(hoists.period * np.arange(len(self._turns) + 1.0)), axis=0)
-        depth_error, stretch = self._depth_error, self._rope.stretch
-        z = np.stack([depth_error, self._rope.load_velocity, depth_error + stretch, still], axis=1)
+        depth_error, stretch = self._depth_error, self.load.stretch
+        z = np.stack([depth_error, self.load.load_velocity, depth_error + stretch, still], axis=1)
         for rise, turn in zip(rises, self._turns, strict=True):
             z[:, 3] = 0.0
             z = self.model.advance(z, (rise - hoists.winch.radius * turn) / hoists.period)
@@ -88,7 +88,7 @@ class KalmanObserver:
 
     def _start(self, o: Columns, rows: Rows) -> None:
         model = self._hoists.model(self._damping_ratio, rows)
-        self._rope.start(model, self._hoists.period, self._stretch_noise(rows), rows)
+        self.load.start(model, self._hoists.period, self._stretch_noise(rows), rows)
         self.waves.start(rows)
         self._heave_rate[rows], self._drum_angle[rows] = o["pulley_velocity_z"], o["drum_angle"]
         self._first_angle[rows], self._depth_error[rows] = o["drum_angle"], 0.0
@@ -105,8 +105,8 @@ class KalmanObserver:
         speed = 0.5 * (heave_rate + self._heave_rate) - paid_out / self._hoists.period
         self._heave_rate, self._drum_angle = heave_rate, drum_angle
         self.waves.advance(heave_rate)
-        self._rope.advance(speed, self._hoists.stretch(o))
-        below = radius * (drum_angle - self._first_angle) + self._rope.stretch
+        self.load.advance(speed, self._hoists.stretch(o))
+        below = radius * (drum_angle - self._first_angle) + self.load.stretch
         self.waves.correct(o["depth_error"] - self.waves.heave() + below)
         self._depth_error = self.waves.heave() - below
 

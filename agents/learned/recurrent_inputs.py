@@ -22,7 +22,7 @@ from aframe_env.validation import InvalidValue
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import FloatArray
 from agents.control.lift import Lift
-from agents.control.observer import observer_for
+from agents.control.observer import KalmanObserver, observer_for
 from agents.control.regulator import Columns, HoistBatch, Observation
 from agents.learned.features import DAMPING_RATIO, lift_features, winch_features
 from agents.learned.lateness import Lateness
@@ -68,6 +68,11 @@ class LookoutConfig:
         )
 
     @property
+    def delay(self) -> int:
+        """Of the readings, in control steps."""
+        return 0 if self.sensors is None else round(self.sensors.delay / self.control_period)
+
+    @property
     def readings(self) -> tuple[str, ...]:
         """Quantities beside the forecasts, each by its unit's scale."""
         return tuple(_SENSED_SCALES if self.sensors else _STATE_SCALES) + ("lateness",) * self.adapts
@@ -107,16 +112,28 @@ class Lookout:
         self._scales = _SENSED_SCALES if config.sensors else _STATE_SCALES
         self._period = config.control_period
         # The bank's time is that of the latest reading's moment of measurement.
-        delay = 0.0 if config.sensors is None else round(config.sensors.delay / self._period) * self._period
+        delay = config.delay * self._period
         self._rates_at = delay + np.array(RATES_AHEAD)
         self._rises_at = delay + np.array((0.0, *RISES_AHEAD))
         self._step_at = delay + np.array((0.0, self._period))
-        self._lateness = Lateness(rows, self._period, round(delay / self._period)) if config.adapts else None
-        self._turned = np.zeros(rows)
+        self._lateness = Lateness(rows, self._period, config.delay) if config.adapts else None
+        self.turned = np.zeros(rows)
+        """(N,) rad: turn of the drums in the latest control step, as reckoned."""
         self.figures = np.zeros((rows, len(FIGURES)), dtype=np.float32)
         """(N, F) ``FIGURES``."""
         self.gains = np.zeros((rows, 4))
         """(N, 4) of the regulator."""
+
+    @property
+    def load_gain(self) -> FloatArray:
+        """(N, 4) gain of the filter of the load at the latest readings, on sensors."""
+        assert isinstance(self._observer, KalmanObserver)
+        return self._observer.load.gain
+
+    @property
+    def told_transition(self) -> FloatArray:
+        """(N, 3, 4) of depth error, its rate and the rope's end, of these and of its mean speed, as that filter has it."""
+        return self._observer.model.a[:, :3]
 
     @property
     def most_speed(self) -> FloatArray:
@@ -162,7 +179,7 @@ class Lookout:
         if self._lateness is not None:
             radius = self._hoists.winch.radius
             self._lateness.advance(radius * self._hoists.winch.speed, radius * o["drum_speed"])
-        self._observer.advance(self._turned, o)
+        self._observer.advance(self.turned, o)
         return self._look(o, o["pulley_velocity_z"] - foretold)
 
     def command(self, share: FloatArray) -> FloatArray:
@@ -177,7 +194,7 @@ class Lookout:
 
     def follow(self, command: FloatArray) -> FloatArray:
         """Reckon with commands (N,) rad/s that are given, by whomever; return them."""
-        self._turned = self._hoists.winch.turn(command)
+        self.turned = self._hoists.winch.turn(command)
         return command
 
     def _look(self, o: Columns, surprise: FloatArray) -> Outlook:

@@ -6,7 +6,8 @@ they serve whatever a network does in their place (``train.apg.twin``).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Final
 
@@ -26,6 +27,7 @@ from agents.control.rope import RopeModel
 from agents.learned.recurrent_inputs import Lookout, LookoutConfig
 from agents.policy import DrumStill, FloatArray
 from agents.rollout import run
+from train.apg.estimates import Estimates
 
 PREVIEW: Final = 90
 """Control steps beyond an episode's end that the pulley's path is recorded for: what the teacher sees ahead."""
@@ -35,6 +37,9 @@ LEAST_CEILING: Final = 0.3
 """Heave reduction of the optimum below which an episode is left out: nothing is to be learned from it."""
 GREATEST_ERROR: Final = 0.6
 """Error of an estimate, m or m/s, beyond which an episode is: its rope went slack."""
+
+GREATEST_DELAY: Final = 0.6
+"""Greatest delay of readings that is followed, s."""
 
 Array = npt.NDArray[Any]
 
@@ -47,6 +52,8 @@ class Recordings:
     """Control step, s."""
     observed: bool
     """Whether the drum's speed is observed, and not reckoned from the commands."""
+    delay: int
+    """Control steps that readings are late, as told."""
     series: Array
     """(N, n, S) of ``Outlook``."""
     figures: Array
@@ -60,7 +67,14 @@ class Recordings:
     told_lag: Array
     """(N,) of the winch, as told, in control steps."""
     error: Array
-    """(N, n, 4) estimated less true state of ``RopeModel``; its last as if the drum's speed were as reckoned."""
+    """(N, n, 4) estimated less true state of ``RopeModel``; its last as if the drum's speed were as reckoned. Where
+    there are gains, the rest is estimated less what ``Estimates`` make of the true state."""
+    gain: Array
+    """(N, n, 4) of the filter of the load; (N, 0, 4) where its errors hardly depend on what the drum does."""
+    told_transition: Array
+    """(N, 3, 4), ``reading`` (N, H) and ``softness`` (N,): of ``Estimates``."""
+    reading: Array
+    softness: Array
     rise: Array
     """(N, n) foretold speed of the pulley in the coming step, as in ``Outlook``, m/s."""
     path: Array
@@ -88,8 +102,13 @@ class Recordings:
 
     def arrays(self) -> dict[str, Array]:
         """All that there is of each episode, by name."""
-        names = (each.name for each in fields(self) if each.name not in ("period", "observed"))
+        names = (each.name for each in fields(self) if each.name not in ("period", "observed", "delay"))
         return {name: getattr(self, name) for name in names}
+
+    @classmethod
+    def of(cls, config: TaskConfig, arrays: Mapping[str, Array]) -> Recordings:
+        """Recordings of a task, from their ``arrays``."""
+        return cls(config.control_period, config.sensors is None, LookoutConfig.of(config).delay, **arrays)
 
     @classmethod
     def joined(cls, parts: Sequence[Recordings]) -> Recordings:
@@ -118,6 +137,10 @@ def require_linear(scenarios: Sequence[Scenario]) -> None:
     for scenario in scenarios:
         if not scenario.is_light:
             raise InvalidValue("a heavy rope, water or a target that moves: the twin of train.apg knows none of them")
+        if (scenario.sensor_delay or 0.0) > GREATEST_DELAY:
+            raise InvalidValue(
+                f"sensor_delay = {scenario.sensor_delay:g} s: must be at most {GREATEST_DELAY:g} s for the twin of train.apg"
+            )
 
 
 def required_path(scenarios: Sequence[Scenario], period: float, steps: int) -> tuple[FloatArray, FloatArray]:
@@ -132,6 +155,19 @@ def required_path(scenarios: Sequence[Scenario], period: float, steps: int) -> t
     return half[::2].T.copy(), rate.T.copy()
 
 
+def readings(scenarios: Sequence[Scenario], config: TaskConfig) -> FloatArray:
+    """Shares (N, H) of the true values now and at each control step before that make a reading, by the true delays."""
+    told = 0.0 if config.sensors is None else config.sensors.delay
+    delays = np.array([told if each.sensor_delay is None else each.sensor_delay for each in scenarios])
+    steps = np.arange(math.ceil(GREATEST_DELAY / config.control_period) + 1)
+    return np.clip(1.0 - abs(delays[:, None] / config.control_period - steps), 0.0, 1.0)
+
+
+def told_softness(scenarios: Sequence[Scenario]) -> FloatArray:
+    """Stretch (N,) of the ropes that tensions are said to make over the true one."""
+    return np.array([s.crane.rope.axial_stiffness / s.as_told.crane.rope.axial_stiffness for s in scenarios])
+
+
 def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Recordings:
     """Record an episode of each scenario; ``seed`` of the sensors' noise. Those of no use are left out."""
     require_linear(scenarios)
@@ -139,28 +175,38 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
     optimum = optimise(scenarios, config, rounds=OPTIMUM_ROUNDS)
     still = run(DrumStill(), scenarios, config)
     path, path_speed = required_path(scenarios, period, steps + PREVIEW)
-    lookout = Lookout(count, LookoutConfig.of(config))
+    made_for = LookoutConfig.of(config)
+    lookout, adapts = Lookout(count, made_for), made_for.adapts
     simulation = Simulation(count, config.replaced(scenario=scenarios[0], observation=config.sensors or "state"))
     noise = np.random.default_rng(seed).integers(2**63, size=count).tolist()
     simulation.reset_rows(np.arange(count), list(zip(scenarios, noise, strict=True)))
     radius = np.array([scenario.crane.winch.drum_radius for scenario in scenarios])
     series, error, rise = [], np.empty((count, steps, 4)), np.empty((count, steps))
+    gain = np.zeros((count, steps if adapts else 0, 4))
+    reading, softness = readings(scenarios, config), told_softness(scenarios)
+    estimates, paid_out = None, np.zeros(count)
     for step in range(steps):
         seen = simulation.observe()
         outlook = lookout.advance(seen) if step else lookout.start(seen, [each.as_told for each in scenarios])
         true = simulation.state
         rope_end = path[:, step] - radius * true[:, task.DRUM_ANGLE]
         rope_end_speed = path_speed[:, step] - outlook.speed
-        z = [true[:, task.DEPTH_ERROR], true[:, task.LOAD_VELOCITY_Z], rope_end, rope_end_speed]
+        state = np.stack([true[:, task.DEPTH_ERROR], true[:, task.LOAD_VELOCITY_Z], rope_end], axis=1)
+        if adapts and step:
+            gain[:, step] = lookout.load_gain
+            state = estimates.advance(*map(torch.from_numpy, (state, path[:, step] - paid_out, gain[:, step]))).numpy()
+        elif adapts:
+            figures = {"told_transition": lookout.told_transition, "reading": reading, "softness": softness}
+            tensors = {name: torch.from_numpy(each.copy()) for name, each in figures.items()}
+            estimates = Estimates.of(period, made_for.delay, tensors)
         series.append(outlook.series)
-        error[:, step] = outlook.z - np.stack(z, axis=1)
+        error[:, step] = outlook.z - np.column_stack([state, rope_end_speed])
         rise[:, step] = outlook.rise
         simulation.advance(lookout.follow(optimum.commands[:, step]))
+        paid_out = paid_out + radius * lookout.turned
     best = np.sqrt(optimum.omega1 / config.duration)
     winches = [scenario.crane.winch for scenario in scenarios]
-    recordings = Recordings(
-        period=period,
-        observed=config.sensors is None,
+    arrays = dict(
         series=np.stack(series, axis=1),
         figures=lookout.figures,
         gains=lookout.gains,
@@ -168,6 +214,10 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
         told_speed=lookout.most_speed,
         told_lag=lookout.lag,
         error=error.astype(np.float32),
+        gain=gain.astype(np.float32),
+        told_transition=lookout.told_transition,
+        reading=reading,
+        softness=softness,
         rise=rise.astype(np.float32),
         path=path,
         path_speed=path_speed.astype(np.float32),
@@ -181,6 +231,7 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
         still=still.rms,
         best=best,
     )
+    recordings = Recordings.of(config, arrays)
     of_use = np.isfinite(best) & (best < (1.0 - LEAST_CEILING) * still.rms)
     of_use &= abs(error).max(axis=(1, 2)) < GREATEST_ERROR
     return recordings.rows(np.flatnonzero(of_use))

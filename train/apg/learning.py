@@ -20,7 +20,8 @@ from train.apg.twin import roll_out
 Report = Callable[[str], object]
 """Is told a figure after each step."""
 Labels = dict[str, Array]
-"""``episode``, ``step``, ``z``, ``speed``, ``reckoned`` and ``share`` (M, …): what ``Teacher.share`` takes and gives."""
+"""``episode``, ``step``, ``estimate``, ``reckoned`` and ``share`` (M, …): what the network sees of load and drum, and what
+``Teacher.share`` says."""
 
 RISES_WEIGHT: Final = 0.3
 """Weight of a rise's squared error, m², beside that of a rate, m²/s²."""
@@ -64,18 +65,16 @@ def ask_teacher(network: RecurrentNetwork, recordings: Recordings, options: ApgO
     rng = np.random.default_rng([options.seed, 2, number])
     with torch.no_grad():
         visited = [roll_out(network, recordings.rows(rows), keep=True) for rows in _chunks(len(recordings.still))]
-    z, speed, reckoned = (
-        np.concatenate([getattr(each, name).numpy() for each in visited]) for name in ("z", "speed", "reckoned")
-    )
+    z, estimate, speed, reckoned = (np.concatenate([each.numpy() for each in kept]) for kept in tuple(zip(*visited))[1:])
     place = rng.permutation(speed.size)[: options.labels]
     episode, step = np.divmod(place, speed.shape[1])
     near = abs(z[episode, step, 0]) < FARTHEST
     episode, step = episode[near], step[near]
-    z, speed, reckoned = z[episode, step], speed[episode, step], reckoned[episode, step]
+    z, estimate, speed, reckoned = (each[episode, step] for each in (z, estimate, speed, reckoned))
     states = (each.astype(np.float64) for each in (z, speed, reckoned))
     share = Teacher(recordings).share(episode, step, *states).astype(np.float32)
     said = np.isfinite(share)
-    labels = {"episode": episode, "step": step, "z": z, "speed": speed, "reckoned": reckoned, "share": share}
+    labels = {"episode": episode, "step": step, "estimate": estimate, "reckoned": reckoned, "share": share}
     return {name: array[said] for name, array in labels.items()}
 
 
@@ -106,11 +105,8 @@ def imitate(
     for step in range(options.imitation_steps):
         some = torch.from_numpy(rng.integers(len(labels["share"]), size=options.imitation_batch))
         episode, at = labels["episode"][some], labels["step"][some]
-        # The true state's last is the rope end's speed with the drum as it turns; the agent's, with it as reckoned.
-        z = labels["z"][some] + r["error"][episode, at]
-        z[:, 3] += labels["speed"][some] - labels["reckoned"][some]
         seen = Load(
-            z,
+            labels["estimate"][some],
             r["rise"][episode, at],
             labels["reckoned"][some],
             r["gains"][episode],

@@ -16,6 +16,7 @@ import torch
 
 from agents.learned.recurrent_network import Load, RecurrentNetwork, clip_one_sided
 from train.apg.data import Recordings
+from train.apg.estimates import Estimates
 
 
 @dataclass(frozen=True)
@@ -84,8 +85,8 @@ class Twin:
 
     def advance(
         self, state: torch.Tensor, speed: torch.Tensor, share: torch.Tensor, rise: torch.Tensor
-    ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Take a control step: state (B, 3) and the rope's speeds (D, B) m/s at its end.
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Take a control step: state (B, 3), speeds (D, B) m/s at its end, and rope (B,) m paid out, as reckoned.
 
         ``share`` (B,): change of the speed that is asked for, as a share of what the winch can; ``rise`` (B,) m of the
         length of rope that would hold the load still.
@@ -94,7 +95,7 @@ class Twin:
         command = clip_one_sided(asked, self.told_speed)
         mean, reached = self.winches.follow(speed, command.expand_as(speed))
         moved = torch.cat([state, (rise / self.period - mean[0])[:, None]], dim=1)
-        return (self.transition @ moved[:, :, None])[:, :, 0], reached
+        return (self.transition @ moved[:, :, None])[:, :, 0], reached, self.period * mean[-1]
 
 
 class Rollout(NamedTuple):
@@ -104,6 +105,8 @@ class Rollout(NamedTuple):
     """(B,) root mean square depth error, m."""
     z: torch.Tensor
     """(B, n, 4) true states of ``RopeModel`` at the steps' starts; (B, 0, 4) where they were not kept."""
+    estimate: torch.Tensor
+    """(B, n, 4) what the network saw of them; likewise."""
     speed: torch.Tensor
     """(B, n) of the rope at the drum, m/s; likewise."""
     reckoned: torch.Tensor
@@ -113,8 +116,8 @@ class Rollout(NamedTuple):
 def roll_out(network: RecurrentNetwork, recordings: Recordings, *, keep: bool = False) -> Rollout:
     """Let a network act through the recorded episodes, on what the filters would have estimated.
 
-    Estimates are the twin's state and the error that the filters made when the episode was recorded: it comes from
-    waves and noise, hardly from what the drum does.
+    Estimates are the twin's state, or what the filters make of it, and the error that they made when the episode was
+    recorded: it comes from waves and noise, hardly from what the drum does.
     """
     r = recordings.tensors()
     twin = Twin.of(recordings, r)
@@ -123,15 +126,19 @@ def roll_out(network: RecurrentNetwork, recordings: Recordings, *, keep: bool = 
     rise = r["path"].diff(dim=1)
     count, steps = r["rise"].shape
     state, speed = twin.start()
-    square, states, speeds = rise.new_zeros(count), [], []
+    estimates = Estimates.of(recordings.period, recordings.delay, r) if r["gain"].shape[1] else None
+    reckoned = rise.new_zeros(count)
+    square, kept = rise.new_zeros(count), []
     for step in range(steps):
         rope_end = r["path_speed"][:, step] - speed
+        estimate = state
+        if estimates is not None and step:
+            estimate = estimates.advance(state, r["path"][:, step] - reckoned, r["gain"][:, step])
+        z = torch.cat([estimate, rope_end[-1, :, None]], dim=1) + r["error"][:, step]
         if keep:
-            states.append(torch.cat([state, rope_end[0, :, None]], dim=1))
-            speeds.append(speed)
-        z = torch.cat([state, rope_end[-1, :, None]], dim=1)
+            kept.append((torch.cat([state, rope_end[0, :, None]], dim=1), z, speed[0], speed[-1]))
         seen = Load(
-            z + r["error"][:, step],
+            z,
             r["rise"][:, step],
             speed[-1],
             r["gains"],
@@ -140,10 +147,10 @@ def roll_out(network: RecurrentNetwork, recordings: Recordings, *, keep: bool = 
             r["told_lag"],
         )
         before = state[:, 0]
-        state, speed = twin.advance(state, speed, network.share(prepared[step], seen), rise[:, step])
+        state, speed, turned = twin.advance(state, speed, network.share(prepared[step], seen), rise[:, step])
+        reckoned = reckoned + turned
         square = square + 0.5 * (before**2 + state[:, 0] ** 2)
     rms = torch.sqrt(square / steps + 1e-12)
     if not keep:
-        return Rollout(rms, rise.new_zeros(count, 0, 4), *rise.new_zeros(2, count, 0))
-    kept = torch.stack(speeds, dim=-1)
-    return Rollout(rms, torch.stack(states, dim=1), kept[0], kept[-1])
+        return Rollout(rms, *rise.new_zeros(2, count, 0, 4), *rise.new_zeros(2, count, 0))
+    return Rollout(rms, *(torch.stack(each, dim=1) for each in zip(*kept, strict=True)))
