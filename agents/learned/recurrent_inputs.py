@@ -132,7 +132,7 @@ class Lookout:
 
     @property
     def told_transition(self) -> FloatArray:
-        """(N, 3, 4) of depth error, its rate and the rope's end, of these and of its mean speed, as that filter has it."""
+        """(N, 3, 4) of depth error, its rate and rope's end, of these and of its mean speed, as the filter has it."""
         return self._observer.model.a[:, :3]
 
     @property
@@ -185,7 +185,7 @@ class Lookout:
     def command(self, share: FloatArray) -> FloatArray:
         """Drum speed commands (N,) rad/s: change the speed by this share (N,) of what the winch can in a step.
 
-        A winch with a lag ramps all through the step where the command is ahead by what it would gain over its lag, too.
+        A winch with a lag ramps all through a step if the command is ahead by what it would gain over its lag, too.
         """
         winch = self._hoists.winch
         wanted = winch.speed + (self._period + winch.lag) * winch.max_acceleration * np.clip(share, -1.0, 1.0)

@@ -126,8 +126,10 @@ class RecurrentNetwork(nn.Module):
         weight, correction, push = self.last(nn.functional.silu(self.second(hidden))).unbind(-1)
         goal = load.rise - torch.sigmoid(weight + 1.0) * p.clamp(-0.5, 0.5) - 0.5 * correction
         wanted = (goal - load.speed) / change
-        share = torch.where(load.lag > 0.0, change_in_lag(wanted, load.lag), change_for(wanted))
-        return share + 2.0 * push
+        share: torch.Tensor = (
+            torch.where(load.lag > 0.0, change_in_lag(wanted, load.lag), change_for(wanted)) + 2.0 * push
+        )
+        return share
 
 
 def change_for(mean: torch.Tensor) -> torch.Tensor:

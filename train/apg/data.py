@@ -7,8 +7,8 @@ they serve whatever a network does in their place (``train.apg.twin``).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from typing import Any, Final
 
 import numpy as np
@@ -48,12 +48,8 @@ Array = npt.NDArray[Any]
 class Recordings:
     """N episodes of n control steps."""
 
-    period: float
-    """Control step, s."""
-    observed: bool
-    """Whether the drum's speed is observed, and not reckoned from the commands."""
-    delay: int
-    """Control steps that readings are late, as told."""
+    made_for: LookoutConfig
+    """What the agents' inputs are made for."""
     series: Array
     """(N, n, S) of ``Outlook``."""
     figures: Array
@@ -96,25 +92,25 @@ class Recordings:
     best: Array
     """(N,) and with the best drum commands."""
 
+    @property
+    def period(self) -> float:
+        """Control step, s."""
+        return self.made_for.control_period
+
     def rows(self, which: npt.NDArray[np.int64] | slice) -> Recordings:
         """Some of the episodes."""
-        return replace(self, **{name: array[which] for name, array in self.arrays().items()})
+        return Recordings(self.made_for, **{name: array[which] for name, array in self.arrays().items()})
 
     def arrays(self) -> dict[str, Array]:
         """All that there is of each episode, by name."""
-        names = (each.name for each in fields(self) if each.name not in ("period", "observed", "delay"))
-        return {name: getattr(self, name) for name in names}
-
-    @classmethod
-    def of(cls, config: TaskConfig, arrays: Mapping[str, Array]) -> Recordings:
-        """Recordings of a task, from their ``arrays``."""
-        return cls(config.control_period, config.sensors is None, LookoutConfig.of(config).delay, **arrays)
+        return {each.name: getattr(self, each.name) for each in fields(self) if each.name != "made_for"}
 
     @classmethod
     def joined(cls, parts: Sequence[Recordings]) -> Recordings:
         """The episodes of all parts, one after the other."""
         names = parts[0].arrays()
-        return replace(parts[0], **{name: np.concatenate([part.arrays()[name] for part in parts]) for name in names})
+        arrays = {name: np.concatenate([part.arrays()[name] for part in parts]) for name in names}
+        return cls(parts[0].made_for, **arrays)
 
     def model(self) -> RopeModel:
         """True model of the loads on their ropes."""
@@ -139,7 +135,8 @@ def require_linear(scenarios: Sequence[Scenario]) -> None:
             raise InvalidValue("a heavy rope, water or a target that moves: the twin of train.apg knows none of them")
         if (scenario.sensor_delay or 0.0) > GREATEST_DELAY:
             raise InvalidValue(
-                f"sensor_delay = {scenario.sensor_delay:g} s: must be at most {GREATEST_DELAY:g} s for the twin of train.apg"
+                f"sensor_delay = {scenario.sensor_delay:g} s: must be at most {GREATEST_DELAY:g} s for the twin of "
+                "train.apg"
             )
 
 
@@ -184,7 +181,8 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
     series, error, rise = [], np.empty((count, steps, 4)), np.empty((count, steps))
     gain = np.zeros((count, steps if adapts else 0, 4))
     reading, softness = readings(scenarios, config), told_softness(scenarios)
-    estimates, paid_out = None, np.zeros(count)
+    estimates: Estimates | None = None
+    paid_out = np.zeros(count)
     for step in range(steps):
         seen = simulation.observe()
         outlook = lookout.advance(seen) if step else lookout.start(seen, [each.as_told for each in scenarios])
@@ -192,13 +190,12 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
         rope_end = path[:, step] - radius * true[:, task.DRUM_ANGLE]
         rope_end_speed = path_speed[:, step] - outlook.speed
         state = np.stack([true[:, task.DEPTH_ERROR], true[:, task.LOAD_VELOCITY_Z], rope_end], axis=1)
-        if adapts and step:
+        if estimates is not None:
             gain[:, step] = lookout.load_gain
             state = estimates.advance(*map(torch.from_numpy, (state, path[:, step] - paid_out, gain[:, step]))).numpy()
         elif adapts:
-            figures = {"told_transition": lookout.told_transition, "reading": reading, "softness": softness}
-            tensors = {name: torch.from_numpy(each.copy()) for name, each in figures.items()}
-            estimates = Estimates.of(period, made_for.delay, tensors)
+            figures = (lookout.told_transition, reading, softness)
+            estimates = Estimates(made_for, *(torch.from_numpy(each.copy()) for each in figures))
         series.append(outlook.series)
         error[:, step] = outlook.z - np.column_stack([state, rope_end_speed])
         rise[:, step] = outlook.rise
@@ -206,7 +203,8 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
         paid_out = paid_out + radius * lookout.turned
     best = np.sqrt(optimum.omega1 / config.duration)
     winches = [scenario.crane.winch for scenario in scenarios]
-    arrays = dict(
+    recordings = Recordings(
+        made_for,
         series=np.stack(series, axis=1),
         figures=lookout.figures,
         gains=lookout.gains,
@@ -231,7 +229,6 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
         still=still.rms,
         best=best,
     )
-    recordings = Recordings.of(config, arrays)
     of_use = np.isfinite(best) & (best < (1.0 - LEAST_CEILING) * still.rms)
     of_use &= abs(error).max(axis=(1, 2)) < GREATEST_ERROR
     return recordings.rows(np.flatnonzero(of_use))

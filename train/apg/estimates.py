@@ -8,38 +8,32 @@ too much makes its load swing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import torch
+
+from agents.learned.recurrent_inputs import LookoutConfig
 
 
 @dataclass
 class Estimates:
     """Of B rows that run in step."""
 
-    period: float
-    """Control step, s."""
+    made_for: LookoutConfig
+    """What the filters are made for."""
     told_transition: torch.Tensor
     """(B, 3, 4) transition of ``Twin`` as the filters have it."""
     reading: torch.Tensor
     """(B, H) shares of the true values now and at the control steps before that make a reading."""
     softness: torch.Tensor
     """(B,) stretch as told by the tension over the true one."""
-    carried: int
-    """Control steps that readings are late, as told."""
-
-    @classmethod
-    def of(cls, period: float, carried: int, tensors: Mapping[str, torch.Tensor]) -> Estimates:
-        """Of recordings, which ``tensors`` are of."""
-        return cls(period, tensors["told_transition"], tensors["reading"], tensors["softness"], carried)
 
     def __post_init__(self) -> None:
         zero = torch.zeros_like(self.reading)
         self._past = torch.stack([zero, zero], dim=1)
         """(B, 2, H) rope's end and stretch as told, the newest first, m."""
         self._read_end = zero[:, 0]
-        self._reckoned = [zero[:, 0]] * (self.carried + 1)
+        self._reckoned = [zero[:, 0]] * (self.made_for.delay + 1)
         """Rope's end as reckoned since the told moment of measurement, m."""
         self._x = zero.new_zeros(len(zero), 4)
         """State of ``RopeFilter``."""
@@ -53,8 +47,8 @@ class Estimates:
         now = torch.stack([state[:, 2], self.softness * (state[:, 2] - state[:, 0])], dim=1)
         self._past = torch.cat([now[:, :, None], self._past[:, :, :-1]], dim=2)
         end, stretch = (self._past * self.reading[:, None]).sum(2).unbind(1)
-        x = self._x
-        moved = torch.cat([x[:, :3], ((end - self._read_end) / self.period)[:, None]], dim=1)
+        x, period = self._x, self.made_for.control_period
+        moved = torch.cat([x[:, :3], ((end - self._read_end) / period)[:, None]], dim=1)
         foretold = torch.cat([(self.told_transition @ moved[:, :, None])[:, :, 0], x[:, 3:]], dim=1)
         missed = stretch - (foretold[:, 2] - foretold[:, 0] + foretold[:, 3])
         self._x = x = foretold + gain * missed[:, None]
@@ -62,6 +56,6 @@ class Estimates:
         self._reckoned = [*self._reckoned[1:], reckoned]
         z = torch.stack([end - (x[:, 2] - x[:, 0]), x[:, 1], end], dim=1)
         for before, after in zip(self._reckoned[:-1], self._reckoned[1:], strict=True):
-            moved = torch.cat([z, ((after - before) / self.period)[:, None]], dim=1)
+            moved = torch.cat([z, ((after - before) / period)[:, None]], dim=1)
             z = (self.told_transition @ moved[:, :, None])[:, :, 0]
         return z

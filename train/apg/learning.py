@@ -20,8 +20,8 @@ from train.apg.twin import roll_out
 Report = Callable[[str], object]
 """Is told a figure after each step."""
 Labels = dict[str, Array]
-"""``episode``, ``step``, ``estimate``, ``reckoned`` and ``share`` (M, …): what the network sees of load and drum, and what
-``Teacher.share`` says."""
+"""``episode``, ``step``, ``estimate``, ``reckoned`` and ``share`` (M, …): what the network sees of load and drum,
+and what ``Teacher.share`` says."""
 
 RISES_WEIGHT: Final = 0.3
 """Weight of a rise's squared error, m², beside that of a rate, m²/s²."""
@@ -65,7 +65,9 @@ def ask_teacher(network: RecurrentNetwork, recordings: Recordings, options: ApgO
     rng = np.random.default_rng([options.seed, 2, number])
     with torch.no_grad():
         visited = [roll_out(network, recordings.rows(rows), keep=True) for rows in _chunks(len(recordings.still))]
-    z, estimate, speed, reckoned = (np.concatenate([each.numpy() for each in kept]) for kept in tuple(zip(*visited))[1:])
+    z, estimate, speed, reckoned = (
+        np.concatenate([each.numpy() for each in kept]) for kept in tuple(zip(*visited, strict=True))[1:]
+    )
     place = rng.permutation(speed.size)[: options.labels]
     episode, step = np.divmod(place, speed.shape[1])
     near = abs(z[episode, step, 0]) < FARTHEST

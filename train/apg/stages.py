@@ -104,7 +104,7 @@ class Training:
             for first in range(0, options.episodes, BLOCK):
                 count = min(BLOCK, options.episodes - first)
                 arrays = self._kept(f"recordings-{first}", partial(self._block, first, count))
-                parts.append(Recordings.of(options.config, arrays))
+                parts.append(Recordings(LookoutConfig.of(options.config), **arrays))
                 report(f"{len(parts[-1].still)} of use", count)
         return Recordings.joined(parts)
 

@@ -74,7 +74,7 @@ class Twin:
         """Of recorded lifts, whose ``tensors`` are those of the recordings."""
         r = tensors
         pairs = [(r["most_change"], r["told_change"]), (r["most_speed"], r["told_speed"]), (r["lag"], r["told_lag"])]
-        alike = recordings.observed or all(torch.equal(true, told) for true, told in pairs)
+        alike = recordings.made_for.sensors is None or all(torch.equal(true, told) for true, told in pairs)
         winches = Winches(*(torch.stack((true,) if alike else (true, told)) for true, told in pairs))
         reach = (1.0 + r["told_lag"]) * r["told_change"]
         return cls(r["transition"], winches, reach, r["told_speed"], recordings.period)
@@ -126,7 +126,8 @@ def roll_out(network: RecurrentNetwork, recordings: Recordings, *, keep: bool = 
     rise = r["path"].diff(dim=1)
     count, steps = r["rise"].shape
     state, speed = twin.start()
-    estimates = Estimates.of(recordings.period, recordings.delay, r) if r["gain"].shape[1] else None
+    filters = (r["told_transition"], r["reading"], r["softness"])
+    estimates = Estimates(recordings.made_for, *filters) if recordings.made_for.adapts else None
     reckoned = rise.new_zeros(count)
     square, kept = rise.new_zeros(count), []
     for step in range(steps):
