@@ -1,7 +1,8 @@
 """Recordings: episodes of the real engine, with what a recurrent agent would have seen in them, and what was true.
 
 The drum plays the optimum meanwhile. Readings, forecasts and the filters' errors hardly depend on what it does, so that
-they serve whatever a network does in their place (``train.apg.twin``).
+they serve whatever a network does in their place (``train.apg.twin``). Where readings are later than told,
+the errors do depend on it, and what the filters make of the load is taken out of them (``train.apg.estimates``).
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ class ApgOptions(RunOptions):
     """Options of a training."""
 
     task: str | None = "Storm"
-    """Task of the suite to learn, by name; None for the package's seas. Its winches must have no lag."""
+    """Task of the suite to learn, by name; None for the package's seas."""
     observation: Literal["state", "sensors"] = "sensors"
     """Observation of the agent."""
     seed: int = 0

@@ -8,13 +8,14 @@ import torch
 from aframe_env import Crane, InvalidValue, ScenarioDistribution, TaskConfig, Winch, task
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.simulation import Simulation
+from aframe_env.suite import find_task
 from agents import cards
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.winch import WinchModel
 from agents.learned.agent import digest
 from agents.learned.recurrent import CARD, WEIGHTS, RecurrentCard, RecurrentPolicy, card_text, load, serialise
-from agents.learned.recurrent_inputs import RATES_AHEAD, RISES_AHEAD, Lookout, LookoutConfig
-from agents.learned.recurrent_network import change_for, clip_one_sided
+from agents.learned.recurrent_inputs import FORECASTS, RATES_AHEAD, RISES_AHEAD, Lookout, LookoutConfig
+from agents.learned.recurrent_network import change_for, change_in_lag, clip_one_sided
 from agents.policy import Knowledge
 from agents.registry import choose_all
 from agents.rollout import held_out_scenarios, run
@@ -162,6 +163,60 @@ def test_the_change_for_a_mean_speed_is_what_the_winch_model_makes_of_it():
     most = 0.1 * winch.max_acceleration
     mean = winch.turn(share * most) / 0.1 / most
     assert change_for(torch.from_numpy(mean)).numpy() == pytest.approx(share, abs=1e-9)
+
+
+def test_the_command_for_a_change_in_lag_is_what_the_winch_model_answers_with_it():
+    """As good as exact while the drum does not ramp, and to an eighth while it does for a part of the step."""
+    for lag in (0.02, 0.1, 0.15, 0.3):
+        share = np.linspace(-1.0, 1.0, 41)
+        winch = WinchModel(len(share), 0.1)
+        winch.start([Crane(winch=Winch(lag=lag))] * len(share))
+        most = 0.1 * winch.max_acceleration
+        winch.turn(share * (1.0 + lag / 0.1) * most)
+        steps = torch.full((len(share),), lag / 0.1).double()
+        error = abs(change_in_lag(torch.from_numpy(winch.speed / most), steps).numpy() - share)
+        assert error[abs(share) < lag / (0.1 + lag)].max() < 1e-9
+        assert error.max() < 0.125
+
+
+def test_it_looks_as_much_further_ahead_as_drum_and_readings_are_late():
+    """Nobody told: the readings of the drum alone show what is late."""
+    unknown = find_task("Unknown")
+    scenarios = unknown.scenarios("train", 16)
+    config = TaskConfig(**unknown.arguments)
+    made_for = LookoutConfig.of(config)
+    assert made_for.adapts
+    assert made_for.readings[-1] == "lateness"
+    simulation = Simulation(16, config.replaced(scenario=scenarios[0], observation=config.sensors))
+    simulation.reset_rows(np.arange(16), [(scenario, 0) for scenario in scenarios])
+    lookouts = [Lookout(16, made_for), Lookout(16, replace(made_for, adapts=False))]
+    foretold, speed = [], []
+    for step in range(500):
+        seen = simulation.observe()
+        told = [scenario.as_told for scenario in scenarios]
+        looks = [each.advance(seen) if step else each.start(seen, told) for each in lookouts]
+        foretold.append([each.series[:, RATES_AHEAD.index(0.3)] for each in looks])
+        speed.append(simulation.state[:, task.PULLEY_VELOCITY_Z].copy())
+        command = np.clip((looks[0].rise - looks[0].speed) / lookouts[0].most_change, -1.0, 1.0)
+        commands = lookouts[0].command(command)
+        assert lookouts[1].follow(commands) is commands
+        simulation.advance(commands)
+    late = np.array([scenario.crane.winch.lag - 0.15 + scenario.sensor_delay - 0.2 for scenario in scenarios])
+    assert looks[0].series[:, FORECASTS + 4] / 5.0 == pytest.approx(late, abs=0.06)
+    # What the drum is to do in 0.3 s as told, it has to be told as much earlier as its winch is later than told.
+    begin = 0.1 * np.arange(500)
+    wanted = 0.3 + np.array([scenario.crane.winch.lag - 0.15 for scenario in scenarios])
+    there = np.array([np.interp(begin + w, begin, v) for w, v in zip(wanted, np.transpose(speed), strict=True)])
+    missed = np.std(np.array(foretold)[150:480] - there.T[150:480, None], axis=0)
+    # In seas that are not so calm that noise is a good part of what is missed.
+    mistimed = (abs(late) > 0.05) & (np.std(there, axis=1) > 0.2)
+    assert mistimed.sum() >= 4
+    assert (missed[0] < 0.8 * missed[1])[mistimed].all()
+
+
+def test_it_adapts_on_sensors_alone():
+    with pytest.raises(InvalidValue, match="adapts = True"):
+        LookoutConfig(waves=WAVES, adapts=True)
 
 
 def test_beyond_a_limit_only_gradients_that_lead_back_come_through():

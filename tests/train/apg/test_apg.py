@@ -125,6 +125,10 @@ def test_bad_options_are_refused(changes, words):
         ApgOptions(**changes)
 
 
-def test_a_task_whose_winches_have_lag_is_refused(tmp_path):
-    with pytest.raises(InvalidValue, match="must be 0 s for the twin"):
-        train(tmp_path / "run", task="Unknown", episodes=4)
+def test_on_unknown_it_reckons_how_late_everything_is(tmp_path):
+    train(tmp_path / "run", task="Unknown", **NOTHING_LEARNED)
+    policy = load(tmp_path / "run")
+    assert policy.card.adapts
+    # A regulator that nobody has taught: what is hand-written of it does the better part.
+    (start,) = looks(tmp_path / "run")
+    assert start["share"] > 0.7

@@ -9,6 +9,7 @@ from aframe_env.scenario.series import drawn_scenarios
 from aframe_env.simulation import Simulation
 from aframe_env.suite import find_task
 from agents.control.optimum import optimise
+from agents.control.winch import WinchModel
 from agents.learned.recurrent_inputs import Lookout, LookoutConfig
 from agents.learned.recurrent_network import RecurrentNetwork
 from agents.rollout import run
@@ -94,6 +95,21 @@ def test_a_network_scores_in_the_engine_what_it_does_on_the_twin_where_nothing_i
     error = abs(on_twin / in_engine - 1.0)
     assert np.median(error) < 0.02
     assert np.quantile(error, 0.9) < 0.1
+
+
+def test_drums_follow_their_commands_as_the_winch_model_has_it():
+    rng = np.random.default_rng(3)
+    speed, command, lag = rng.uniform(-2.5, 2.5, 300), rng.uniform(-4.0, 4.0, 300), rng.uniform(0.0, 0.4, 300)
+    command[:100] = speed[:100] + rng.uniform(-0.3, 0.3, 100)  # near enough for all that a step may be
+    lag[::5] = 0.0
+    model = WinchModel(300, 0.1)
+    model.max_speed[:], model.max_acceleration[:], model.lag[:], model.speed[:] = 3.0, 2.0, lag, speed
+    turned = model.turn(command)
+    most = torch.full((300,), 0.2, dtype=torch.float64)
+    winches = Winches(most, 15.0 * most, torch.from_numpy(lag / 0.1))
+    mean, reached = winches.follow(torch.from_numpy(speed), torch.from_numpy(command))
+    assert 0.1 * mean.numpy() == pytest.approx(turned, abs=1e-12)
+    assert reached.numpy() == pytest.approx(model.speed, abs=1e-12)
 
 
 def test_the_optimum_scores_on_the_twin_what_it_does_in_the_engine(scenarios, recordings):
