@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -14,9 +15,10 @@ from aframe_env.dynamics.flexible.readout import READOUTS, readout_kernel
 from aframe_env.dynamics.flexible.step import flexible_kernels
 from aframe_env.dynamics.start import inner_steps, longest_inner_step
 from aframe_env.engine import Engine, FloatArray, Timing
-from aframe_env.rfem.reduction import STATIC_SHAPES, modal_frame
+from aframe_env.rfem.luffed import grid_angles
+from aframe_env.rfem.reduction import STATIC_SHAPES, SWING_SHAPES, modal_frame
 from aframe_env.rfem.structure import Division
-from aframe_env.rfem.tables import readout_table, step_table
+from aframe_env.rfem.tables import passage, readout_table, step_table
 from aframe_env.scenario import Scenario
 from aframe_env.scenario.crane import Frame
 from aframe_env.scenario.motion import Components
@@ -49,7 +51,7 @@ class Mesh:
     def room(self) -> int:
         """Most modal coordinates that a frame can have."""
         free = 6 * (2 * self.division.leg + self.division.beam + 1) - 6
-        return free if self.modes is None else min(free, self.modes + STATIC_SHAPES)
+        return free if self.modes is None else min(free, self.modes + STATIC_SHAPES + SWING_SHAPES)
 
 
 def mesh_of(model: str, rfes: Sequence[int] | None, modes: int | None) -> Mesh | None:
@@ -100,7 +102,8 @@ class FlexibleEngine(Engine):
         """Arguments as for ``Engine``, and the mesh. A stiff rope shortens ``max_inner_step`` too."""
         self.mesh = mesh
         self._slots = flex.slots(mesh.room)
-        self._lines: dict[tuple[Frame, float], int] = {}
+        self._lines: dict[tuple[Frame, float, bool], int] = {}
+        self._steps: dict[Frame, float] = {}
         self._tables, self._readout_tables = np.zeros((0, 0)), np.zeros((0, 0))
         super().__init__(rows, control_period, components, max_inner_step)
         self._flexible_kernels = flexible_kernels(self._lanes)
@@ -121,9 +124,7 @@ class FlexibleEngine(Engine):
     def row_vector(self, scenario: Scenario) -> FloatArray:
         """Slots of a row at the start of a scenario, the frame's first: (frame slots + slots,)."""
         if scenario.luffing is not None:
-            raise InvalidValue(
-                f'luffing = {shown(scenario.luffing)}: model = "rfem" has no frame that luffs: must be None'
-            )
+            scenario.luffing.require_rigid_servomotors(scenario.crane.frame)
         if scenario.crane.winch.drive is not None:
             raise InvalidValue(
                 f'drive = {shown(scenario.crane.winch.drive)}: model = "rfem" has no drum with inertia: must be None'
@@ -132,6 +133,8 @@ class FlexibleEngine(Engine):
         frame = np.zeros(self._slots)
         frame[flex.FRAME] = self._line(scenario)
         frame[flex.DRUM : flex.DRUM + 3] = scenario.crane.drum_position
+        frame[flex.PULLEY : flex.PULLEY + 3] = scenario.crane.pulley_position
+        frame[flex.LEAN] = 1.0
         comoving = float(scenario.initial == "comoving")
         flexible_kernels(1, heavy=not scenario.is_light).start(row[None], frame[None], self._tables, comoving)
         return np.concatenate([frame, row])
@@ -172,7 +175,8 @@ class FlexibleEngine(Engine):
 
     def _adopt(self, vector: FloatArray, scenario: Scenario) -> FloatArray:
         adopted = np.concatenate([vector[: self._slots], super()._adopt(vector[self._slots :], scenario)])
-        adopted[flex.FRAME] = self._line(scenario)
+        x, _, z = vector[flex.PULLEY : flex.PULLEY + 3]
+        adopted[flex.FRAME] = self._line(scenario, math.atan2(x, z))
         return adopted
 
     def _timing(self, scenario: Scenario) -> Timing:
@@ -185,16 +189,54 @@ class FlexibleEngine(Engine):
 
     def _frame_step(self, frame: Frame) -> float:
         """Longest inner step that a frame's modes allow, s."""
-        modal = modal_frame(frame, self.mesh.division, self.mesh.modes)
-        return float(np.clip(MODE_PHASE / np.sqrt(modal.square[modal.natural - 1]), *FLEXIBLE_STEPS))
+        if frame not in self._steps:
+            modal = modal_frame(frame, self.mesh.division, self.mesh.modes)
+            highest = np.sqrt(modal.square[modal.natural - 1])
+            self._steps[frame] = float(np.clip(MODE_PHASE / highest, *FLEXIBLE_STEPS))
+        return self._steps[frame]
 
-    def _line(self, scenario: Scenario) -> int:
-        """Line of a scenario's frame in the tables, which it is added to when new."""
-        key = scenario.crane.frame, self._timing(scenario).inner_step
+    def _line(self, scenario: Scenario, angle: float | None = None) -> int:
+        """Line of a scenario's frame in the tables, which it is added to when new.
+
+        ``angle``: that for which a frame that luffs is to have it, rad; None for that of its start.
+        """
+        frame, step = scenario.crane.frame, self._timing(scenario).inner_step
+        if scenario.luffing is None or scenario.luffing.holds:
+            return self._line_of(frame, step, False)
+        start, grid = frame.luffing_angle, grid_angles(scenario.luffing)
+        angles = sorted({*grid, start})
+        lines: dict[float, int] = {}
+        for place, each in enumerate(angles):
+            lines[each] = self._line_of(replace(frame, luffing_angle=each), step, True)
+            # A row goes from the first angle to the grid, and does not come back to it.
+            for other in angles[max(place - 2, 0) : place]:
+                if not any(other < between < each for between in grid):
+                    self._join(lines, 0, replace(frame, luffing_angle=other), each, grid)
+                    self._join(lines, 1, replace(frame, luffing_angle=each), other, grid)
+        wanted = start if angle is None else angle
+        return lines[min(lines, key=lambda each: abs(each - wanted))]
+
+    def _join(self, lines: dict[float, int], way: int, here: Frame, there: float, grid: list[float]) -> None:
+        """Tell the line of a frame that luffs its neighbour up (``way`` 0) or down (1), ``there`` in rad."""
+        if there not in grid:
+            return
+        table = self._tables[lines[here.luffing_angle]]
+        first = int(table[flex.SWING])
+        if table[first + flex.NEIGHBOUR + way] < 0.0:
+            table[first + flex.NEIGHBOUR + way] = lines[there]
+            table[first + flex.HALFWAY + way] = math.sin(0.5 * abs(there - here.luffing_angle))
+            matrix = passage(here, there, self.mesh.division, self.mesh.modes, table[flex.STEP]).ravel()
+            begin = int(table[first + flex.PASSAGE + way])
+            table[begin : begin + matrix.size] = matrix
+
+    def _line_of(self, frame: Frame, step: float, luffs: bool) -> int:
+        """Line of a frame at its luffing angle, for inner steps of ``step`` s."""
+        key = frame, step, luffs
         if key not in self._lines:
             mesh = self.mesh
-            self._tables = _with_line(self._tables, step_table(key[0], mesh.division, mesh.modes, key[1]))
-            self._readout_tables = _with_line(self._readout_tables, readout_table(key[0], mesh.division, mesh.modes))
+            self._tables = _with_line(self._tables, step_table(frame, mesh.division, mesh.modes, step, luffs))
+            readout = readout_table(frame, mesh.division, mesh.modes, step if luffs else None)
+            self._readout_tables = _with_line(self._readout_tables, readout)
             self._lines[key] = len(self._tables) - 1
         return self._lines[key]
 

@@ -28,6 +28,8 @@ class ExactStep:
     The last axes are (m,), or (m, m) where the damping couples the modes.
     """
 
+    step: float
+    """Its length, s."""
     free: Array
     """(2, 2, …): η and η̇ at the start."""
     linear: Array
@@ -61,6 +63,7 @@ def exact_step(modal: ModalFrame, step: float) -> ExactStep:
         factors = np.moveaxis(np.concatenate(single)[:, :, :, 0, 0], 0, -1)
     one, first, second, third = np.moveaxis(factors[:, 2:], 1, 0)
     return ExactStep(
+        step=step,
         free=factors[:, :2],
         linear=np.stack([one - first, first], axis=1),
         cubic=np.stack(

@@ -75,6 +75,16 @@ def angle_nodes(luffing: Luffing) -> Array:
     return np.linspace(least, most, 1 + math.ceil((most - least) / SPACING))
 
 
+def grid_angles(luffing: Luffing) -> list[float]:
+    """Luffing angles on the way that have modes of their own behind the environment beside the first, rad, rising.
+
+    Multiples of SPACING, which other ways share.
+    """
+    angles = [angle for _, angle in luffing.points]
+    steps = range(math.ceil(min(angles) / SPACING), math.floor(max(angles) / SPACING) + 1)
+    return [step * SPACING for step in steps]
+
+
 def model_at(model: FrameModel, angle: float) -> FrameModel:
     """The model of the same frame at another luffing angle, rad."""
     frame = replace(model.frame, luffing_angle=angle)

@@ -31,7 +31,9 @@ CARRIED_MODES = 8
 ones."""
 STATIC_SHAPES = 11
 """Most static shapes beside the modes of a reduced frame: a force at S, a uniform field, the deck's angular
-acceleration, three each; the lengths of two servomotors. A frame that luffs has two more, of forces across them."""
+acceleration, three each; the lengths of two servomotors."""
+SWING_SHAPES = 2
+"""Static shapes more of a frame that luffs: forces across its servomotors."""
 ROUNDING = 1e-9
 """Share of the damping's diagonal up to which what lies off it is rounding."""
 SPARSE = 600

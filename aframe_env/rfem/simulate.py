@@ -96,11 +96,8 @@ class DynamicCase:
             raise InvalidValue("second_order = True: must be False with luffing, as the state at rest changes")
         if self.strokes is not None and elastic is not None:
             raise InvalidValue("strokes: must be None with elastic servomotors, as only rigid ones have a given length")
-        if self.scenario.luffing is not None and elastic is not None:
-            raise InvalidValue(
-                f"servomotor.stiffness = {elastic!r} N/m: must be None, rigid, with luffing, as only rigid ones have a "
-                "given length"
-            )
+        if self.scenario.luffing is not None:
+            self.scenario.luffing.require_rigid_servomotors(self.scenario.crane.frame)
         if self.scenario.luffing is not None and self.strokes is not None:
             raise InvalidValue("strokes: must be None with luffing, which has strokes of its own")
 

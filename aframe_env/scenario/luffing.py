@@ -82,6 +82,20 @@ class Luffing:
         """Time at which the frame has come to rest, s."""
         return self.points[-1][0]
 
+    @property
+    def holds(self) -> bool:
+        """Whether it keeps its first angle."""
+        return len({angle for _, angle in self.points}) == 1
+
+    def require_rigid_servomotors(self, frame: Frame) -> None:
+        """Raise where the servomotors are elastic, with which the full model cannot luff."""
+        elastic = frame.structure.servomotor.stiffness
+        if elastic is not None:
+            raise InvalidValue(
+                f"servomotor.stiffness = {elastic!r} N/m: must be None, rigid, with luffing, as only rigid ones have a "
+                "given length"
+            )
+
     def strokes(self, frame: Frame) -> list[tuple[float, float]]:
         """Time [s] and length of the servomotors [m] at each point."""
         return [(time, replace(frame, luffing_angle=angle).servomotor_length) for time, angle in self.points]

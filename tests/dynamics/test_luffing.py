@@ -226,12 +226,6 @@ def test_waves_about_the_load_are_those_where_the_pulley_has_got_to() -> None:
     assert engine.read(at.FLOW + 2)[0] == pytest.approx(upwards, abs=1e-6)
 
 
-def test_full_model_refuses_a_frame_that_luffs() -> None:
-    scenario = Scenario(crane=CRANE, target_level=-60.0, luffing=QUICK)
-    with pytest.raises(InvalidValue, match=r'luffing = .*: model = "rfem" has no frame that luffs: must be None'):
-        AFrameHeaveEnv(scenario=scenario, model="rfem", rfes=(1, 2)).reset(seed=0)
-
-
 def test_information_tells_angle_and_pulley_and_the_picture_shows_them() -> None:
     scenario = Scenario(crane=CRANE, target_level=-20.0, motion=HarmonicMotion(), luffing=QUICK)
     env = AFrameHeaveEnv(scenario=scenario, episode_duration=65.0, render_mode="rgb_array")

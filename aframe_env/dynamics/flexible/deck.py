@@ -68,14 +68,22 @@ def write_pose(
     frame[(flex.ORIGIN + 3) * lanes + j] = surge[1]
     frame[(flex.ORIGIN + 4) * lanes + j] = sway[1]
     frame[(flex.ORIGIN + 5) * lanes + j] = heave[1]
+    fx, fy, fz = -surge[2], -sway[2], -row[at.GRAVITY * lanes + j] - heave[2]
+    for k in range(3):
+        frame[(flex.INPUT + k) * lanes + j] = turned[k] * fx + turned[3 + k] * fy + turned[6 + k] * fz
+    put_turning(frame, spin, spin_up, lanes, j)
+
+
+@scalar
+def put_turning(
+    frame: Block, spin: tuple[float, float, float], spin_up: tuple[float, float, float], lanes: int, j: int
+) -> None:
+    """Write lane j's SPIN, and the part of INPUT that turns, from the angular velocity and acceleration."""
     x, y, z = spin
     a, b, c = spin_up
     frame[flex.SPIN * lanes + j] = x
     frame[(flex.SPIN + 1) * lanes + j] = y
     frame[(flex.SPIN + 2) * lanes + j] = z
-    fx, fy, fz = -surge[2], -sway[2], -row[at.GRAVITY * lanes + j] - heave[2]
-    for k in range(3):
-        frame[(flex.INPUT + k) * lanes + j] = turned[k] * fx + turned[3 + k] * fy + turned[6 + k] * fz
     frame[(flex.INPUT + 3) * lanes + j] = -y * y - z * z
     frame[(flex.INPUT + 4) * lanes + j] = x * y - c
     frame[(flex.INPUT + 5) * lanes + j] = x * z + b
@@ -91,21 +99,32 @@ def write_pose(
 def deck_at(row: Block, frame: Block, index: int, lanes: int) -> None:
     """Pose at the end of inner step ``index`` of the segment; lanes that have fewer stay at their segment's end."""
     for j in range(lanes):
-        duration, substeps = row[at.CONTROL_PERIOD * lanes + j], row[at.SUBSTEPS * lanes + j]
-        done = index + 1.0
-        elapsed = duration * (done if done < substeps else substeps) / substeps
-        write_pose(
-            row,
-            frame,
-            lanes,
-            j,
-            coordinate_at(frame, 0, elapsed, lanes, j),
-            coordinate_at(frame, 1, elapsed, lanes, j),
-            coordinate_at(frame, 2, elapsed, lanes, j),
-            coordinate_at(frame, 3, elapsed, lanes, j),
-            coordinate_at(frame, 4, elapsed, lanes, j),
-            coordinate_at(frame, 5, elapsed, lanes, j),
-        )
+        pose_lane(row, frame, elapsed_at(row, index + 1.0, lanes, j), lanes, j)
+
+
+@scalar
+def elapsed_at(row: Block, done: float, lanes: int, j: int) -> float:
+    """Time into the segment of lane j once ``done`` inner steps have been made, or all that it has, s."""
+    duration, substeps = row[at.CONTROL_PERIOD * lanes + j], row[at.SUBSTEPS * lanes + j]
+    elapsed: float = duration * (done if done < substeps else substeps) / substeps
+    return elapsed
+
+
+@scalar
+def pose_lane(row: Block, frame: Block, elapsed: float, lanes: int, j: int) -> None:
+    """Pose of lane j's deck ``elapsed`` s into the segment."""
+    write_pose(
+        row,
+        frame,
+        lanes,
+        j,
+        coordinate_at(frame, 0, elapsed, lanes, j),
+        coordinate_at(frame, 1, elapsed, lanes, j),
+        coordinate_at(frame, 2, elapsed, lanes, j),
+        coordinate_at(frame, 3, elapsed, lanes, j),
+        coordinate_at(frame, 4, elapsed, lanes, j),
+        coordinate_at(frame, 5, elapsed, lanes, j),
+    )
 
 
 @scalar

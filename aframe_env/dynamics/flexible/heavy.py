@@ -9,8 +9,9 @@ load, with one tension, and what the lumps, held on the line, hand on to it acro
 the lever rule. The head's own vibration has no part in that inertia: a rope, unlike a rod, would not follow it
 sideways. The Coriolis force on the lumps, some 1e-4 of the tension, acts on the load alone.
 
-Rope that goes over S as the head comes nearer to the drum is written to ENDS as if the drum had paid it out; the row
-has the distance from drum to pulley at rest. The end of a step in ENDS is where the next one starts.
+Rope that goes over S as the deflected head comes nearer to the drum is written to ENDS as if the drum had paid it out;
+ENDS have the distance from drum to pulley at rest, and what luffing adds to it. The end of a step in ENDS is where the
+next one starts.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ from aframe_env.dynamics.lift import (
     COST,
     ELEMENT,
     END_ACCELERATION,
+    END_REACH,
     END_TARGET,
     END_VELOCITY,
     LENGTH,
@@ -80,7 +82,7 @@ class RopeOut(NamedTuple):
 @scalar
 def put_head(row: Array, frame: Array, shift: Vector, rate: Vector, drum: RopeOut, lanes: int, j: int) -> None:
     """Write END, with S displaced by ``shift`` [m] at ``rate`` [m/s] along {D}, and what the ``drum`` has out."""
-    pulley = add(three(row, at.PULLEY_ON_DECK, lanes, j), shift)
+    pulley = add(three(frame, flex.PULLEY, lanes, j), shift)
     inboard, to_drum = unit(difference(three(frame, flex.DRUM, lanes, j), pulley))
     turned = nine(frame, flex.ROTATION, lanes, j)
     place = add(three(frame, flex.ORIGIN, lanes, j), apply(turned, pulley))
@@ -88,9 +90,12 @@ def put_head(row: Array, frame: Array, shift: Vector, rate: Vector, drum: RopeOu
     velocity = add(three(frame, flex.ORIGIN + 3, lanes, j), apply(turned, turning))
     felt = difference(apply(nine(frame, flex.INPUT + 3, lanes, j), pulley), three(frame, flex.INPUT, lanes, j))
     acceleration = add(apply(turned, felt), Vector(0.0, 0.0, -row[at.GRAVITY * lanes + j]))
-    over = row[at.DRUM_TO_PULLEY * lanes + j] - inboard
-    end = RopeEnd(place, velocity, drum.length + over, drum.speed + inner(to_drum, rate), 0.0)
-    put_end(row, END, lanes, j, end, acceleration, (row[at.DRUM_TO_PULLEY * lanes + j], 0.0))
+    reach = row[at.DRUM_TO_PULLEY * lanes + j] + frame[flex.REACHED * lanes + j]
+    reach_rate = frame[(flex.REACHED + 1) * lanes + j]
+    over = reach - inboard
+    nearing = inner(to_drum, difference(rate, three(frame, flex.DRUM_RATE, lanes, j)))
+    end = RopeEnd(place, velocity, drum.length + over, drum.speed + (nearing + reach_rate), 0.0)
+    put_end(row, END, lanes, j, end, acceleration, (reach, reach_rate))
 
 
 @scalar
@@ -119,7 +124,14 @@ def put_middle(row: Array, drum: tuple[RopeOut, RopeOut, RopeOut], h: float, lan
     )
     middle = RopeEnd(Vector(x, y, z), Vector(u, v, w), drum[1].length + over, drum[1].speed + over_rate, 0.0)
     both = add(three(row, START + END_ACCELERATION, lanes, j), three(row, END + END_ACCELERATION, lanes, j))
-    put_end(row, MIDDLE, lanes, j, middle, scaled(0.5, both), (row[at.DRUM_TO_PULLEY * lanes + j], 0.0))
+    reach = halfway(
+        row[(START + END_REACH) * lanes + j],
+        row[(START + END_REACH + 1) * lanes + j],
+        row[(END + END_REACH) * lanes + j],
+        row[(END + END_REACH + 1) * lanes + j],
+        h,
+    )
+    put_end(row, MIDDLE, lanes, j, middle, scaled(0.5, both), reach)
 
 
 @scalar
@@ -146,7 +158,7 @@ def handed_up(row: Array, lanes: int, j: int) -> Vector:
 @scalar
 def directions(row: Array, frame: Array, shift: Vector, on_drum: float, lanes: int, j: int) -> Vector:
     """Unit vector from S to the load and ``on_drum`` times that to the drum, along {D}; S displaced by ``shift``."""
-    pulley = add(three(row, at.PULLEY_ON_DECK, lanes, j), shift)
+    pulley = add(three(frame, flex.PULLEY, lanes, j), shift)
     _, to_drum = unit(difference(three(frame, flex.DRUM, lanes, j), pulley))
     return add(
         apply_transposed(nine(frame, flex.ROTATION, lanes, j), three(row, at.STAGE + AXIS, lanes, j)),
@@ -267,7 +279,7 @@ def rest_heavy(row: Array, frame: Array, table: Array, lanes: int, j: int) -> Ve
         chain = select(row[at.SPRINGS * lanes + j] > 1.0, row[at.ROPE_WEIGHT * lanes + j] * below, 0.0)
         tension = row[at.LOAD_WEIGHT * lanes + j] + row[at.HALF_WEIGHT * lanes + j] + chain
         deflection = rest(row, frame, table, tension, lanes, j)
-        pulley = add(three(row, at.PULLEY_ON_DECK, lanes, j), deflection)
+        pulley = add(three(frame, flex.PULLEY, lanes, j), deflection)
         inboard, _ = unit(difference(three(frame, flex.DRUM, lanes, j), pulley))
         row[at.DRUM_PART * lanes + j] *= inboard / row[at.DRUM_TO_PULLEY * lanes + j]
         row[at.DRUM_TO_PULLEY * lanes + j] = inboard
@@ -285,7 +297,7 @@ def hang(row: Array, frame: Array, deflection: Vector, comoving: float, lanes: i
         unstretched = 0.5 * (unstretched - row[at.DRUM_PART * lanes + j]) / (springs - 1)
         above = row[(at.LIFT + 1) * lanes + j]
     strain = row[at.LOAD_WEIGHT * lanes + j] / row[at.AXIAL_STIFFNESS * lanes + j]
-    pulley = add(three(row, at.PULLEY_ON_DECK, lanes, j), deflection)
+    pulley = add(three(frame, flex.PULLEY, lanes, j), deflection)
     velocity = put_below(row, frame, pulley, above + unstretched * (1.0 + strain), comoving, lanes, j)
     for i in range(1, springs):
         row[(at.LIFT + SPEED + i) * lanes + j] = -comoving * velocity.z

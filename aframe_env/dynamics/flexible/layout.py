@@ -2,7 +2,8 @@
 
 Rows are stored as in ``aframe_env.dynamics.layout``, in an array of their own: (blocks, slots(modes) * lanes). The
 constants of a frame are one line of a table, (frames, size): the head, then MODE_SIZE numbers for each mode, then the
-carried matrix, then, where the damping couples the modes, the matrices of the step. All float64, SI.
+carried matrix, then, where the damping couples the modes, the matrices of the step, then the numbers of a frame that
+luffs (``swing``). All float64, SI.
 """
 
 from __future__ import annotations
@@ -45,7 +46,20 @@ ACTIVE: Final = TIP + 6
 """1 where the row takes part in the inner step that is under way."""
 HELD: Final = ACTIVE + 1
 """Load and lumps of a rope with mass at the start of the inner step, as in LIFT of ``aframe_env.dynamics.layout``."""
-MODES: Final = HELD + LIFT_SIZE
+PULLEY: Final = HELD + LIFT_SIZE
+"""Pulley S along the axes that all vectors here are along, the frame undeformed, 3, m."""
+LEAN: Final = PULLEY + 3
+"""Cosine and sine of the angle by which these axes have luffed from {D}; 1 and 0 where the frame holds. They are those
+of a deck that has turned with the frame since the luffing angle of its line in the tables."""
+DRUM_RATE: Final = LEAN + 2
+"""Velocity of the drum along these axes, 3, m/s."""
+REACHED: Final = DRUM_RATE + 3
+"""What luffing has added to |SH| of the undeformed frame, m, and its rate."""
+SLOPE: Final = REACHED + 2
+"""τ: tangent of the angle by which the servomotors have turned in the frame since that luffing angle."""
+TURNED: Final = SLOPE + 1
+"""Forces of S_R and S_L across their line at that luffing angle, N, and the strokes along it, m; 2 each."""
+MODES: Final = TURNED + 4
 """MODE_SLOTS for each mode from here on."""
 POSITION: Final = 0
 RATE: Final = 1
@@ -72,7 +86,9 @@ GIVE_RATE: Final = 31
 """Rate of S in the same way, 9 each."""
 REST: Final = 58
 """Displacement of S at rest for a unit force there, 9, m/N."""
-HEAD: Final = 67
+SWING: Final = 67
+"""Where the numbers of a frame that luffs begin in its line; 0 where it holds."""
+HEAD: Final = 68
 # Of each mode.
 SQUARE: Final = 0
 """ω², 1/s²."""
@@ -94,6 +110,29 @@ MODE_SIZE: Final = 47
 # Matrices of a coupled step: place, then rate, by the modes' places, rates, forces at the start and at the end, and by
 # the rope's elastic force at the start and its rate.
 MATRICES: Final = 6
+
+# Of a frame that luffs, from SWING on: two neighbours in luffing angle, up and down.
+NEIGHBOUR: Final = 0
+"""Their lines in the tables, or -1, 2."""
+HALFWAY: Final = 2
+"""Sines of the angles by which the axes have luffed where a row goes over to them, 2."""
+PASSAGE: Final = 4
+"""Where in the line the matrices begin that take the modes there, 2."""
+OWN_PULLEY: Final = 6
+"""PULLEY of this line, 3."""
+LOADED: Final = 9
+"""What is sensed of the servomotors, the reactions of S_R and S_L and the displacements across them, by INPUT and PULL
+beside what the modes tell: 15 each."""
+FEED: Final = 69
+"""The same by TURNED, 4 × 4."""
+FELT: Final = 85
+"""What the modes tell at the step's end by the rope's force there, 3 each."""
+LOOP: Final = 97
+"""All that is sensed at the step's end by TURNED there, 4 × 4."""
+SERVOMOTORS: Final = 113
+"""Of each mode, TURNED_SIZE: what its place tells, 4, its place and rate by TURNED at the step's end, 4 each, and what
+of its place is TURNED's at once, 4. By symmetry the numbers that its place tells are those of TURNED's force on it."""
+TURNED_SIZE: Final = 16
 
 
 def slots(modes: int) -> int:

@@ -37,7 +37,7 @@ SMALL_ROTATION: Final = 0.05
 """Rotation of an rfe up to which eq. (10) is taken to hold, rad."""
 
 # Head of a line of the readout's table.
-COUNT, CARRIED_COUNT, SPRINGS, POINTS, DAMPED, BODIES, HEAD = 0, 1, 2, 3, 4, 5, 6
+COUNT, CARRIED_COUNT, SPRINGS, POINTS, DAMPED, BODIES, SWING, HEAD = 0, 1, 2, 3, 4, 5, 6, 7
 FORCES: Final = 11
 """Numbers that are linear in the state: columns up to UTILISATION."""
 
@@ -87,6 +87,19 @@ def read_frame(frame: Array, table: Array, stresses: Array, result: Array, lanes
     for k in range(3):
         add_line(forces, table, acting + FORCES * (12 + 9 * carried + k), FORCES, frame[(flex.PULL + k) * lanes + j])
         add_line(stresses, table, fields + 6 * springs * k, 6 * springs, frame[(flex.INPUT + k) * lanes + j])
+    if table[SWING] > 0.0:
+        swing = int(table[SWING])
+        for k in range(4):
+            turned = frame[(flex.TURNED + k) * lanes + j]
+            add_line(forces, table, swing + FORCES * k, FORCES, turned)
+            add_line(stresses, table, swing + 4 * FORCES + 6 * springs * k, 6 * springs, turned)
+        slope = frame[flex.SLOPE * lanes + j]
+        for k in range(SERVOMOTORS, SERVOMOTORS + 2):
+            forces[k] *= math.sqrt(1.0 + slope * slope)
+    # Along the deck's axes: those of the tables have luffed with the frame.
+    cosine, sine = frame[flex.LEAN * lanes + j], frame[(flex.LEAN + 1) * lanes + j]
+    for k in (DEFLECTION, FEET, FEET + 3):
+        forces[k], forces[k + 2] = cosine * forces[k] + sine * forces[k + 2], cosine * forces[k + 2] - sine * forces[k]
     worst = 0.0
     for spring in range(springs):
         n, v2, v3 = abs(stresses[6 * spring]), abs(stresses[6 * spring + 1]), abs(stresses[6 * spring + 2])

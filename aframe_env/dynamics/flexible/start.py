@@ -143,11 +143,12 @@ def pull_head(row: Array, frame: Array, deflection: Vector, lanes: int, j: int) 
 
 @scalar
 def release(frame: Array, table: Array, lanes: int, j: int) -> None:
-    """Find what the deck does to the modes at the start."""
+    """Find what the deck does to the modes as they are."""
     modes, carried = int(table[flex.COUNT]), int(table[flex.CARRIED_COUNT])
     for b in range(carried):
-        place = frame[(flex.MODES + flex.MODE_SLOTS * b + flex.POSITION) * lanes + j]
-        write_carried(frame, slots_of(frame, flex.CARRIED + 9 * b, 9, lanes), place, 0.0, lanes, j)
+        mode = flex.MODES + flex.MODE_SLOTS * b
+        place, rate = frame[(mode + flex.POSITION) * lanes + j], frame[(mode + flex.RATE) * lanes + j]
+        write_carried(frame, slots_of(frame, flex.CARRIED + 9 * b, 9, lanes), place, rate, lanes, j)
     for i in range(modes):
         c = flex.HEAD + flex.MODE_SIZE * i
         uniform, turning = three(table, c + flex.FIELD, 1, 0), nine(table, c + flex.FIELD + 3, 1, 0)

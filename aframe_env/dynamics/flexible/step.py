@@ -28,8 +28,10 @@ from aframe_env.dynamics.flexible.rope import (
     unit,
 )
 from aframe_env.dynamics.flexible.start import start_rows
+from aframe_env.dynamics.flexible.swing import pose_any, predict_any
 from aframe_env.dynamics.inner_step import drum_at, plan_winch
 from aframe_env.dynamics.layout import LANES, Span
+from aframe_env.dynamics.luffing import swing_frame, tell_angle
 from aframe_env.dynamics.step import plan_any
 from aframe_env.dynamics.vector import Vector, add, difference, scaled
 from aframe_env.dynamics.water import begin_water_at_node
@@ -161,18 +163,36 @@ def step_any_rope(row: Array, frame: Array, table: Array, index: int, span: Span
 
 
 @scalar
-def advance_deck_in_water(row: Array, frame: Array, components: int, records: Array, lanes: int) -> None:
-    """Advance the deck, the water's motion over the segment being found first."""
+def pose_held(row: Array, frame: Array, tables: Array, index: int, lanes: int) -> None:
+    """Pose frames that hold on their deck."""
+    deck_at(row, frame, index, lanes)
+
+
+@scalar
+def tell_nothing(row: Array, span: Span) -> None:
+    """Tell nothing of frames that hold."""
+
+
+@scalar
+def advance_any_deck(row: Array, frame: Array, components: int, records: Array, lanes: int) -> None:
+    """Advance deck and frames that luff, the water's motion over the segment being found first."""
     begin_water_at_node(row, Span(lanes, 0, lanes))
+    swing_frame(row, Span(lanes, 0, lanes))
     advance_deck(row, frame, components, records, lanes)
 
 
 def _step_of(
     advance: Callable[[Array, Array, int, Array, int], None],
     plan_winches: Callable[[Array, Span], None],
+    pose: Callable[[Array, Array, Array, int, int], None],
+    predict: Callable[[Array, Array, int], None],
     step_rope: Callable[[Array, Array, Array, int, Span], None],
+    tell: Callable[[Array, Span], None],
 ) -> Callable[..., None]:
-    """Control step of a block, by how a segment begins, winches are planned, and rope and load are stepped."""
+    """Control step of a block.
+
+    By how a segment begins, winches are planned, frames posed and predicted, rope and load stepped, and how it ends.
+    """
 
     @scalar
     def control_step(
@@ -189,12 +209,13 @@ def _step_of(
             advance(row, frame, components, records, lanes)
             plan_winches(row, Span(lanes, 0, lanes))
             for index in range(int(most)):
-                deck_at(row, frame, index, lanes)
+                pose(row, frame, tables, index, lanes)
                 for line in range(tables.shape[0]):
                     if mark_active(row, frame, line, index, lanes):
-                        predict_modes(frame, tables[line], lanes)
+                        predict(frame, tables[line], lanes)
                         step_rope(row, frame, tables[line], index, Span(lanes, 0, lanes))
                         correct_modes(frame, tables[line], lanes)
+        tell(row, Span(lanes, 0, lanes))
         for j in range(lanes):
             row[at.OMEGA1 * lanes + j] += row[at.STEP_COST * lanes + j]
 
@@ -203,8 +224,8 @@ def _step_of(
 
 # Control step of a block by ``segments`` motion segments, the command held: with the paper's rope alone, and with ropes
 # of either kind, which takes long to compile and gives the paper's rope the same bits.
-control_step = _step_of(advance_deck, plan_winch, step_rope_and_load)
-any_control_step = _step_of(advance_deck_in_water, plan_any, step_any_rope)
+control_step = _step_of(advance_deck, plan_winch, pose_held, predict_modes, step_rope_and_load, tell_nothing)
+any_control_step = _step_of(advance_any_deck, plan_any, pose_any, predict_any, step_any_rope, tell_angle)
 
 
 class FlexibleKernels(NamedTuple):
