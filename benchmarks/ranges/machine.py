@@ -38,9 +38,10 @@ MOST_INNER_STEPS: Final = 500
 
 
 def known_to_the_full_model(source: Source) -> Source:
-    """The same without what that model refuses: a drum with inertia, a frame that luffs."""
+    """The same without what that model refuses: a drum with inertia, a frame that luffs on elastic servomotors."""
     crane = replace(source.crane, winch=replace(source.crane.winch, drive=None))
-    changes = {"luffing": None} if isinstance(source, Scenario) else {}
+    elastic = crane.frame.structure.servomotor.stiffness is not None
+    changes = {"luffing": None} if isinstance(source, Scenario) and elastic else {}
     found: Source = values.made(lambda: replace(source, crane=crane, **changes))
     return found
 
