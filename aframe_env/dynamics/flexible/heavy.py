@@ -90,11 +90,13 @@ def put_head(row: Array, frame: Array, shift: Vector, rate: Vector, drum: RopeOu
     velocity = add(three(frame, flex.ORIGIN + 3, lanes, j), apply(turned, turning))
     felt = difference(apply(nine(frame, flex.INPUT + 3, lanes, j), pulley), three(frame, flex.INPUT, lanes, j))
     acceleration = add(apply(turned, felt), Vector(0.0, 0.0, -row[at.GRAVITY * lanes + j]))
-    reach = row[at.DRUM_TO_PULLEY * lanes + j] + frame[flex.REACHED * lanes + j]
-    reach_rate = frame[(flex.REACHED + 1) * lanes + j]
-    over = reach - inboard
-    nearing = inner(to_drum, difference(rate, three(frame, flex.DRUM_RATE, lanes, j)))
-    end = RopeEnd(place, velocity, drum.length + over, drum.speed + (nearing + reach_rate), 0.0)
+    reach, reach_rate, over_rate = row[at.DRUM_TO_PULLEY * lanes + j], 0.0, inner(to_drum, rate)
+    # Where no frame luffs, slots that are not read cost nothing.
+    if row[at.LUFFING_POINTS * lanes + j] > 0.0:
+        reach += frame[flex.REACHED * lanes + j]
+        reach_rate = frame[(flex.REACHED + 1) * lanes + j]
+        over_rate += reach_rate - inner(to_drum, three(frame, flex.DRUM_RATE, lanes, j))
+    end = RopeEnd(place, velocity, drum.length + (reach - inboard), drum.speed + over_rate, 0.0)
     put_end(row, END, lanes, j, end, acceleration, (reach, reach_rate))
 
 
@@ -124,13 +126,15 @@ def put_middle(row: Array, drum: tuple[RopeOut, RopeOut, RopeOut], h: float, lan
     )
     middle = RopeEnd(Vector(x, y, z), Vector(u, v, w), drum[1].length + over, drum[1].speed + over_rate, 0.0)
     both = add(three(row, START + END_ACCELERATION, lanes, j), three(row, END + END_ACCELERATION, lanes, j))
-    reach = halfway(
-        row[(START + END_REACH) * lanes + j],
-        row[(START + END_REACH + 1) * lanes + j],
-        row[(END + END_REACH) * lanes + j],
-        row[(END + END_REACH + 1) * lanes + j],
-        h,
-    )
+    reach = row[at.DRUM_TO_PULLEY * lanes + j], 0.0
+    if row[at.LUFFING_POINTS * lanes + j] > 0.0:
+        reach = halfway(
+            row[(START + END_REACH) * lanes + j],
+            row[(START + END_REACH + 1) * lanes + j],
+            row[(END + END_REACH) * lanes + j],
+            row[(END + END_REACH + 1) * lanes + j],
+            h,
+        )
     put_end(row, MIDDLE, lanes, j, middle, scaled(0.5, both), reach)
 
 

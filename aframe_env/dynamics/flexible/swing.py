@@ -168,17 +168,23 @@ def predict_any(frame: Array, table: Array, lanes: int) -> None:
 def pose_any(row: Array, frame: Array, tables: Array, index: int, lanes: int) -> None:
     """Do what ``deck_at`` does with frames that may luff, and have them use the tables of the nearest luffing angle."""
     for j in range(lanes):
-        table = tables[int(frame[flex.FRAME * lanes + j])]
-        first = int(table[flex.SWING])
-        if first > 0 and index < row[at.SUBSTEPS * lanes + j]:
-            sine = frame[(flex.LEAN + 1) * lanes + j]
-            for way in range(2):
-                if (sine if way == 0 else -sine) > table[first + flex.HALFWAY + way]:
-                    go_over(row, frame, tables, way, index, lanes, j)
+        if row[at.LUFFING_POINTS * lanes + j] > 0.0 and index < row[at.SUBSTEPS * lanes + j]:
+            go_on(row, frame, tables, index, lanes, j)
     deck_at(row, frame, index, lanes)
     for j in range(lanes):
         if row[at.LUFFING_POINTS * lanes + j] > 0.0:
             lean(row, frame, elapsed_at(row, index + 1.0, lanes, j), lanes, j)
+
+
+@scalar
+def go_on(row: Array, frame: Array, tables: Array, index: int, lanes: int, j: int) -> None:
+    """Take lane j to another line at the start of inner step ``index`` where it has come half way there."""
+    table, sine = tables[int(frame[flex.FRAME * lanes + j])], frame[(flex.LEAN + 1) * lanes + j]
+    first = int(table[flex.SWING])
+    if first > 0 and sine > table[first + flex.HALFWAY]:
+        go_over(row, frame, tables, 0, index, lanes, j)
+    elif first > 0 and -sine > table[first + flex.HALFWAY + 1]:
+        go_over(row, frame, tables, 1, index, lanes, j)
 
 
 @scalar
