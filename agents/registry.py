@@ -139,7 +139,7 @@ def _law(make: Callable[[Sensors, ExpectedWaves], Policy]) -> PolicySpec:
     return PolicySpec(make(Sensors(), _ANY_WAVES).name, lambda context: make(context.sensors, context.waves))
 
 
-def _predictive(name: str, sensed: bool) -> PolicySpec:
+def _predictive(name: str, sensed: bool, adapts: bool = False) -> PolicySpec:
     def build(context: BuildContext) -> Policy:
         heavy = not context.nominal.is_light
         return PredictiveControl(
@@ -147,6 +147,7 @@ def _predictive(name: str, sensed: bool) -> PolicySpec:
                 sensors=context.sensors if sensed else None,
                 horizon=SLOW_HORIZON if heavy else PlanningConfig.horizon,
                 waves=context.waves,
+                adapts=adapts,
             )
         )
 
@@ -178,6 +179,7 @@ REGISTRY: Final[dict[str, PolicySpec]] = {
         _law(lambda sensors, waves: Feedback(sensors, waves=waves)),
         _predictive("predictive control (state)", False),
         _predictive("predictive control", True),
+        _predictive("adaptive predictive control", True, True),
         _law(lambda sensors, waves: InverseDynamics()),
         _output_zero("state", "output zero"),
         _output_zero("sensors", "output zero on sensors"),

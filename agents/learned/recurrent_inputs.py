@@ -21,11 +21,11 @@ from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import FloatArray
+from agents.control.lateness import Lateness
 from agents.control.lift import Lift
 from agents.control.observer import KalmanObserver, observer_for
 from agents.control.regulator import Columns, HoistBatch, Observation
 from agents.learned.features import DAMPING_RATIO, lift_features, winch_features
-from agents.learned.lateness import Lateness
 
 Float32Array = npt.NDArray[np.float32]
 

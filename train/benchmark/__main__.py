@@ -42,6 +42,7 @@ class Options(RunOptions, Where):
         "output zero on sensors",
         "feed-forward + feedback",
         "predictive control",
+        "adaptive predictive control",
         "drive-map",
         "ppo-sensors",
         "sac-sensors",

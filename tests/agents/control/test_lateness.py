@@ -1,7 +1,12 @@
 import numpy as np
 import pytest
 
-from agents.learned.lateness import MOST, Lateness
+from aframe_env import TASKS, InvalidValue, TaskConfig
+from agents.control.lateness import MOST, Lateness
+from agents.control.predictive import PlanningConfig
+from agents.policy import DrumStill
+from agents.registry import BuildContext, choose
+from agents.rollout import run
 
 PERIOD, DELAY = 0.1, 2
 TIMES = PERIOD * np.arange(600)
@@ -43,3 +48,32 @@ def test_noise_hides_it_hardly_and_does_not_make_any_of_a_drum_at_rest():
 
 def test_no_more_than_that_is_reckoned_with():
     assert reckon(np.array([1.0, -1.0]), np.zeros(2)) == pytest.approx([MOST, -MOST])
+
+
+def test_rows_that_begin_anew_know_nothing():
+    lateness = Lateness(2, PERIOD, DELAY)
+    for time in TIMES[:200]:
+        lateness.advance(np.full(2, np.sin(time)), np.full(2, np.sin(time - 0.4)))
+    before = lateness.seconds
+    lateness.start(np.array([1]))
+    assert lateness.seconds.tolist() == [before[0], 0.0]
+    assert before[0] == pytest.approx(0.2, abs=0.01)
+
+
+def test_predictive_control_that_adapts_holds_what_is_not_as_told():
+    task = TASKS["Unknown"]
+    config, scenarios = TaskConfig(**task.arguments), task.scenarios("train", 12)
+    still = run(DrumStill(), scenarios, config).rms
+    reduction = {}
+    for name in ("predictive control", "adaptive predictive control", "feed-forward + feedback"):
+        policy = choose(name).policy(BuildContext(scenarios=scenarios, config=config))
+        reduction[name] = 1.0 - run(policy, scenarios, config).rms / still
+    plain, adaptive, other = reduction.values()
+    assert adaptive.mean() > 0.93
+    assert adaptive.min() > 0.8
+    assert adaptive.mean() > max(plain.mean(), other.mean()) + 0.03
+
+
+def test_the_full_state_is_never_late():
+    with pytest.raises(InvalidValue, match="adapts = True: it takes sensors"):
+        PlanningConfig(sensors=None, adapts=True)

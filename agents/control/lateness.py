@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from agents.control.filters import FloatArray
+from agents.control.filters import ALL, FloatArray, Rows
 
 SMOOTHING: Final = 0.5
 """Time constant by which both speeds are smoothed first, s: noise and the last commands' small moves tell nothing."""
@@ -35,6 +35,12 @@ class Lateness:
         """Both, smoothed."""
         self._likeness, self._size = np.zeros((2, rows))
         """Sums of -(y - u) u' and of u'², m²/s⁴."""
+
+    def start(self, rows: Rows = ALL) -> None:
+        """Forget what was read in these rows."""
+        self._past[:, rows] = 0.0
+        for each in (self._reckoned, self._read, self._likeness, self._size):
+            each[rows] = 0.0
 
     def advance(self, reckoned: FloatArray, read: FloatArray) -> None:
         """Take speeds (N,) m/s of the rope at the drum, a control step later: as reckoned to be now, and as read."""
