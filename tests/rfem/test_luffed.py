@@ -1,4 +1,4 @@
-"""A full model that luffs: the model that holds, cranes built anew, the rigid frame, and conservation of energy."""
+"""A full model that luffs: a multibody program, cranes built anew, the rigid frame, and conservation of energy."""
 
 import math
 from dataclasses import replace
@@ -20,6 +20,7 @@ from aframe_env.scenario.cross_sections import FrameStructure, Material, Servomo
 from aframe_env.scenario.motion import HarmonicMotion
 from aframe_env.validation import InvalidValue
 from train.verify.cases import dynamic_case, dynamic_columns
+from train.verify.luffing_checks import COLUMNS, FRAME_COLUMNS, LITTLE_SECOND_ORDER, forces_at_rest, swing_run
 from train.verify.run_checks import rough_sea
 
 COARSE = Division(leg=5, beam=2)
@@ -31,6 +32,23 @@ def swinging(material: Material | None = None, duration: float = 8.0, **changes:
     frame = Frame(luffing_angle=INBOARD, structure=FrameStructure(material=material or Material()))
     luffing = Luffing.swing(INBOARD, OUTBOARD, 0.5, duration, max_speed=5.0, max_acceleration=5.0)
     return Scenario.paper(crane=Crane(frame=frame), luffing=luffing, **changes)
+
+
+@pytest.mark.parametrize(("stiffer", "columns"), [(10.0, COLUMNS), (1.0, LITTLE_SECOND_ORDER)])
+def test_swing_is_that_of_a_multibody_program(stiffer, columns):
+    run = swing_run(stiffer)
+    assert {column: run.error(column) for column in columns if run.error(column) > 0.01} == {}
+    assert run.here["luffing_rad"] == pytest.approx(run.there["luffing_rad"], abs=1e-7)
+    assert run.here["luffing_rad"][[0, -1]] == pytest.approx([INBOARD, OUTBOARD])
+
+
+def test_what_the_linear_frame_leaves_out_of_a_swing_is_of_second_order():
+    run = swing_run()
+    rest = forces_at_rest(INBOARD, run.there["T_rope_N"][0], second_order=True)
+    for column in FRAME_COLUMNS:
+        exact = run.there[column][0]
+        assert rest[column] == pytest.approx(exact, rel=1e-3), column
+        assert abs(run.here[column][0] - exact) > 5.0 * abs(rest[column] - exact), column
 
 
 def test_frame_that_holds_is_that_of_the_ordinary_model_by_the_modes_of_another_angle(monkeypatch):

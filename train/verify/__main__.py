@@ -43,7 +43,7 @@ from train.shared.cli import parse
 from train.shared.console import PlainConsole
 from train.shared.job_store import JobStore, version_of
 from train.shared.run_folder import RunOptions, new_file, open_jobs, user_errors, write_json, write_text
-from train.verify import frame_checks, rope_cases, rope_checks, run_checks, water_checks
+from train.verify import frame_checks, luffing_checks, rope_cases, rope_checks, run_checks, water_checks
 from train.verify.cases import (
     FORMAT,
     dynamic_case,
@@ -78,6 +78,8 @@ CHECKS: Sequence[Callable[[], Check | list[Check]]] = (
     run_checks.releases,
     run_checks.paper_case,
     run_checks.shocks,
+    luffing_checks.swings,
+    luffing_checks.rigid_swing,
     run_checks.stiff_frame,
     run_checks.energy,
     run_checks.steps,
