@@ -43,7 +43,7 @@ from train.shared.cli import parse
 from train.shared.console import PlainConsole
 from train.shared.job_store import JobStore, version_of
 from train.shared.run_folder import RunOptions, new_file, open_jobs, user_errors, write_json, write_text
-from train.verify import frame_checks, luffing_checks, rope_cases, rope_checks, run_checks, water_checks
+from train.verify import drive_checks, frame_checks, luffing_checks, rope_cases, rope_checks, run_checks, water_checks
 from train.verify.cases import (
     FORMAT,
     dynamic_case,
@@ -94,8 +94,9 @@ WATER_CHECKS: Sequence[Callable[[], Check | list[Check]]] = (
     rope_checks.massless_limit,
     rope_checks.energy,
     *water_checks.CHECKS,
+    drive_checks.torque_drive,
 )
-"""Every check of heavy ropes and loads in water."""
+"""Every check of heavy ropes, loads in water, and what drives the drum."""
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from aframe_env.scenario.crane import Crane
 from train.shared.run_folder import write_atomically
 from train.verify.cases import dynamic_columns
 from train.verify.frame_checks import CASES, model
+from train.verify.luffing_checks import swing_run
 from train.verify.run_checks import paper_run, ramp_release, shock_run
 
 HERE, REFERENCE = "#1f77b4", "#d62728"
@@ -207,6 +208,17 @@ def shock_histories() -> Figure:
     return _histories(here["t_s"], here, there, [OUTBOARD, UPWARDS, SERVOMOTOR, *REACTIONS], _FLEXIBLE)
 
 
+def swing_histories() -> Figure:
+    """Draw a frame that luffs from −20° to 25°: load, deflection of S, servomotor force, reactions."""
+    run = swing_run()
+    load = Panel("xL3_m", "Level of the load", "$x_{L3}$", "m", 1.0)
+    names = ("rfem 20/16", "geometrically exact beams")
+    panels = [load, OUTBOARD, UPWARDS, SERVOMOTOR, *REACTIONS]
+    figure = _histories(run.here["t_s"], run.here, run.there, panels, names)
+    figure.axes[0].legend(fontsize=8, loc="lower left")
+    return figure
+
+
 def figure_14() -> Figure:
     """Draw x_L3 in the full and the simplified model, and their difference."""
     here, there, rigid = (
@@ -246,6 +258,7 @@ def draw_all(folder: Path) -> list[Path]:
             ("mode_shapes", mode_shapes),
             ("release_ramp", release_histories),
             ("shock", shock_histories),
+            ("swing", swing_histories),
             ("figure_11_deflection", figure_11),
             ("figure_12_forces", figure_12),
             ("figure_14_load", figure_14),
