@@ -6,6 +6,7 @@ from .scenario.file import read_scenario, read_scenarios, scenario_text
 from .scenario.loads import LOADS, ReadyLoad
 from .scenario.luffing import Luffing
 from .scenario.motion import Harmonic, HarmonicMotion
+from .scenario.preview import Preview
 from .scenario.recorded_motion import RecordedMotion, RecordedWindow
 from .scenario.scenario import Scenario
 from .scenario.sea import Sea, SeaMotion
@@ -39,6 +40,7 @@ __all__ = [
     "InvalidValue",
     "LoadShape",
     "Luffing",
+    "Preview",
     "ReadyLoad",
     "RecordNoiseWarning",
     "RecordedMotion",

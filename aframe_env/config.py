@@ -94,7 +94,7 @@ class TaskConfig:
     @property
     def quantities(self) -> tuple[task.Quantity, ...]:
         """Quantities of the observation."""
-        return task.STATE if self.sensors is None else task.SENSED
+        return task.quantities(self.sensors)
 
     @property
     def given(self) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from aframe_env.flexible_engine import FlexibleEngine, Mesh
 from aframe_env.rfem.model import warn_of_rotation
 from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.scenario.motion import require_coverage
+from aframe_env.scenario.preview import PreviewBank, require_foreseeable
 from aframe_env.scenario.sensors import SensorBank
 from aframe_env.validation import InvalidValue, shown
 
@@ -52,6 +53,8 @@ class Simulation:
             self._engine = FlexibleEngine(rows, self.control_period, config.mesh, max_inner_step=config.max_inner_step)
         self._report = task.report_kernel(self._engine.lanes)
         self._bank = SensorBank(config.sensors, rows, self.control_period) if config.sensors else None
+        preview = config.sensors.preview if config.sensors else None
+        self._previews = PreviewBank(preview, rows, self.control_period) if preview else None
         self.observation_space = task.box(config.quantities)
         self._low, self._high = self.observation_space.low, self.observation_space.high
         limit = np.float32(self.source.max_drum_speed)
@@ -98,6 +101,8 @@ class Simulation:
         elif not isinstance(scenario, Scenario):
             raise InvalidValue(f"options['scenario'] = {shown(scenario)}: must be a Scenario")
         require_coverage(scenario.motion, "episode_duration", self.episode_duration)
+        if self._previews is not None:
+            require_foreseeable(scenario)
         return scenario, noise_seed
 
     def reset_rows(self, indices: npt.NDArray[np.int64], drawn: list[tuple[Scenario, int]]) -> None:
@@ -111,6 +116,8 @@ class Simulation:
             truth = self._sensed_truth()
             for index, (scenario, noise_seed) in zip(indices.tolist(), drawn, strict=True):
                 self._bank.reset_row(index, truth[index], noise_seed, scenario.sensor_delay)
+                if self._previews is not None:
+                    self._previews.start_row(index, scenario, noise_seed)
 
     def advance(self, commands: FloatArray) -> None:
         """Advance every row by one control step; ``commands`` (rows,) rad/s, finite."""
@@ -124,7 +131,8 @@ class Simulation:
         """Return a fresh observation of every row: (rows, K)."""
         values = self.state
         if self._bank is not None:
-            values = np.concatenate([self._bank.readings, self._known()], axis=1)
+            foretold = () if self._previews is None else (self._previews.at(self.steps),)
+            values = np.concatenate([self._bank.readings, self._known(), *foretold], axis=1)
         observation = np.empty(values.shape, dtype=np.float32)
         task.clip(values, self._low, self._high, observation)
         if self._bank is None:
@@ -152,6 +160,9 @@ class Simulation:
         self.steps[index] = state.step
         if self._bank is not None and state.sensors is not None:
             self._bank.write_row(index, state.sensors, state.scenario.sensor_delay)
+            if self._previews is not None:
+                *_, noise_seed, _ = state.sensors
+                self._previews.start_row(index, state.scenario, noise_seed)
         self._read_out(np.array([index]))
 
     def _read_out(self, rows: npt.NDArray[np.int64]) -> None:

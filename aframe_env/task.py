@@ -82,7 +82,17 @@ SENSED: Final = (
     Quantity("load_mass", "kg", 0.0, 1e7),
     Quantity("rope_length", "m", 0.0, 1e5),
 )
-"""Observation "sensors": the readings, and what the operator knows of the lift before it begins."""
+"""Observation "sensors": the readings, and what the operator knows of the lift before it begins. A preview comes after
+them."""
+
+
+def quantities(sensors: Sensors | None) -> tuple[Quantity, ...]:
+    """Quantities that are observed with these sensors; None: of the full state."""
+    if sensors is None:
+        return STATE
+    leads = () if sensors.preview is None else sensors.preview.leads
+    return (*SENSED, *(Quantity(f"pulley_heave_in_{lead:g}_s", "m", -100.0, 100.0) for lead in leads))
+
 
 # Columns of the results: what a step reports beside the observation, in double precision.
 TIME, LOAD, TENSION, SLACK, OMEGA1, OMEGA2, COST, PARTED = 0, 1, 4, 5, 6, 7, 8, 9

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from aframe_env.dynamics.compiling import kernel
 from aframe_env.dynamics.random import normal
 from aframe_env.memory import require_memory
+from aframe_env.scenario.preview import Preview
 from aframe_env.validation import InvalidValue, require_instance, require_number, shown
 
 FloatArray = npt.NDArray[np.float64]
@@ -59,6 +60,8 @@ class Sensors:
     """Time from a motion to its reading, s; for all channels."""
     mass_told: bool = True
     """False: the load's mass is not told before the lift, and ``load_mass`` reads 0."""
+    preview: Preview | None = None
+    """What a wave radar foretells of the pulley's heave; None: there is no radar."""
     heave: Channel = field(default_factory=lambda: Channel(noise=0.05, relative_noise=0.05, correlation_time=30.0))
     """Pulley's vertical displacement, m."""
     heave_rate: Channel = field(default_factory=lambda: Channel(noise=0.01, relative_noise=0.01))
@@ -80,6 +83,8 @@ class Sensors:
         require_number("delay", self.delay, "s", low=0.0, high=10.0)
         if not isinstance(self.mass_told, bool):
             raise InvalidValue(f"mass_told = {shown(self.mass_told)}: must be True or False")
+        if self.preview is not None:
+            require_instance("preview", self.preview, Preview)
         for name in CHANNELS:
             require_instance(name, getattr(self, name), Channel)
 

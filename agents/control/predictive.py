@@ -23,6 +23,7 @@ from agents.control.interior_point import BoundedTracking
 from agents.control.lateness import Lateness
 from agents.control.lift import Lift
 from agents.control.observer import observer_for
+from agents.control.previewed_path import PreviewedPath
 from agents.control.regulator import QUICKEST, Columns, HoistBatch, Observation
 from agents.control.rope import RopeModel
 from agents.policy import FloatArray, Knowledge
@@ -114,6 +115,7 @@ class Planner:
         self._observer = observer_for(self.hoists, config.damping_ratio, config.sensors, config.waves)
         self._delay = 0 if config.sensors is None else round(config.sensors.delay / control_period)
         self._lateness = Lateness(rows, control_period, self._delay) if config.adapts else None
+        self._previewed = PreviewedPath.of(config.sensors, rows, control_period)
         self._turned, self._efforts = np.zeros(rows), np.ones(rows)
         self._k, self._cost_to_go = np.zeros((rows, 4)), np.zeros((rows, 4, 4))
 
@@ -123,6 +125,8 @@ class Planner:
         self._observer.start(o, rows)
         if self._lateness is not None:
             self._lateness.start(rows)
+        if self._previewed is not None:
+            self._previewed.take(observation, rows)
         self._tune(rows)
         return o
 
@@ -144,6 +148,8 @@ class Planner:
         if self._lateness is not None:
             self._lateness.advance(winch.radius * winch.speed, winch.radius * o["drum_speed"])
         self._observer.advance(self._turned, o)
+        if self._previewed is not None:
+            self._previewed.take(observation)
         return o
 
     def plan(self) -> Plan:
@@ -155,6 +161,9 @@ class Planner:
             ahead = self.period * (self._delay + np.arange(horizon + 1.0))[:, None] + self._lateness.seconds
             rises = np.diff(self._observer.waves.path(ahead), axis=0)
             z[:, 3] = self._observer.waves.rate(ahead[:1])[0] - winch.radius * winch.speed
+        if self._previewed is not None:
+            foretold = self._previewed.rises(self._observer.waves, horizon)
+            rises[: len(foretold)] = foretold
         return self.plan_for(z, rises.T / self.period, winch.speed)
 
     def command(self, rope_speed: FloatArray) -> FloatArray:

@@ -16,6 +16,7 @@ from aframe_env.scenario.water import LoadShape, Water
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue, require_numbers
 from agents.control.lift import Lift
+from agents.control.regulator import readable
 from agents.learned.feature_sets import features_for
 from agents.learned.features import FeatureConfig, Features
 from agents.learned.plan_features import PlanFeatures
@@ -123,7 +124,7 @@ class OnFeatures(ABC):
         quantities, name = (SENSED, "sensors") if self._config.sensors else (STATE, "state")
         width = len(quantities)
         values = require_numbers("observation", observation, f"({width},) or (N, {width})")
-        if values.ndim not in (1, 2) or values.shape[-1] != width:
+        if values.ndim not in (1, 2) or not readable(values.shape[-1], width):
             raise InvalidValue(
                 f"observation of shape {values.shape}: must be ({width},) or (N, {width}), "
                 f'the environment\'s observation="{name}"'

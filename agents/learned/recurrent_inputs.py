@@ -3,6 +3,7 @@
 A bank of waves that expects the task's seas tells the pulley's motion to come, and Kalman filters the load's state now,
 as for predictive control (``agents.control.observer``). The agent sees the forecasts beside the readings that they come
 from, and how far each reading was from what had been foretold: what the bank gets wrong is for the network to learn.
+Where a wave radar foretells the heave, it sees how far the pulley will have risen by each lead, too.
 """
 
 from __future__ import annotations
@@ -17,13 +18,14 @@ import numpy.typing as npt
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import ScenarioDistribution, ScenarioSource
 from aframe_env.scenario.sensors import Sensors
-from aframe_env.task import SENSED, STATE
+from aframe_env.task import SENSED, STATE, quantities
 from aframe_env.validation import InvalidValue
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import FloatArray
 from agents.control.lateness import Lateness
 from agents.control.lift import Lift
 from agents.control.observer import KalmanObserver, observer_for
+from agents.control.previewed_path import PreviewedPath
 from agents.control.regulator import Columns, HoistBatch, Observation
 from agents.learned.features import DAMPING_RATIO, lift_features, winch_features
 
@@ -74,12 +76,15 @@ class LookoutConfig:
 
     @property
     def readings(self) -> tuple[str, ...]:
-        """Quantities beside the forecasts, each by its unit's scale."""
-        return tuple(_SENSED_SCALES if self.sensors else _STATE_SCALES) + ("lateness",) * self.adapts
+        """Quantities beside the forecasts, each by its unit's scale: what is read, and what a radar foretells."""
+        foretold = quantities(self.sensors)[len(SENSED) :] if self.sensors else ()
+        read = tuple(_SENSED_SCALES if self.sensors else _STATE_SCALES)
+        return (*read, *("lateness",) * self.adapts, *(quantity.name for quantity in foretold))
 
 
 _SENSED_SCALES: Final = {"pulley_velocity_z": 1.0, "pulley_heave": 0.5, "roll": 10.0, "pitch": 10.0}
 _STATE_SCALES: Final = {"pulley_velocity_z": 1.0, "pulley_heave": 0.5, "pulley_acceleration_z": 1.0}
+_PREVIEW_SCALE: Final = 0.5
 _SURPRISE_SCALE: Final = 10.0
 _LATENESS_SCALE: Final = 5.0
 
@@ -109,6 +114,7 @@ class Lookout:
     def __init__(self, rows: int, config: LookoutConfig) -> None:
         self._hoists = HoistBatch(rows, config.control_period, STATE if config.sensors is None else SENSED)
         self._observer = observer_for(self._hoists, DAMPING_RATIO, config.sensors, config.waves)
+        self._previewed = PreviewedPath.of(config.sensors, rows, config.control_period)
         self._scales = _SENSED_SCALES if config.sensors else _STATE_SCALES
         self._period = config.control_period
         # The bank's time is that of the latest reading's moment of measurement.
@@ -156,7 +162,7 @@ class Lookout:
         o = hoists.start(lifts, observation)
         self._observer.start(o)
         self._tune(o)
-        return self._look(o, np.zeros(len(observation)))
+        return self._look(observation, o, np.zeros(len(observation)))
 
     def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
         """Go on with other ropes, as by ``HoistBatch.retune``."""
@@ -180,7 +186,7 @@ class Lookout:
             radius = self._hoists.winch.radius
             self._lateness.advance(radius * self._hoists.winch.speed, radius * o["drum_speed"])
         self._observer.advance(self.turned, o)
-        return self._look(o, o["pulley_velocity_z"] - foretold)
+        return self._look(observation, o, o["pulley_velocity_z"] - foretold)
 
     def command(self, share: FloatArray) -> FloatArray:
         """Drum speed commands (N,) rad/s: change the speed by this share (N,) of what the winch can in a step.
@@ -197,17 +203,22 @@ class Lookout:
         self.turned = self._hoists.winch.turn(command)
         return command
 
-    def _look(self, o: Columns, surprise: FloatArray) -> Outlook:
+    def _look(self, observation: Observation, o: Columns, surprise: FloatArray) -> Outlook:
         waves, winch, lateness = self._observer.waves, self._hoists.winch, self._lateness
         rates_at, rises_at, step_at = self._rates_at, self._rises_at, self._step_at
         if lateness is not None:
             rates_at, rises_at, step_at = (each[:, None] + lateness.seconds for each in (rates_at, rises_at, step_at))
         path = waves.path(rises_at)
+        foretold = np.zeros((0, len(surprise)))
+        if self._previewed is not None:
+            self._previewed.take(observation)
+            foretold = self._previewed.rises_at_leads(waves)
         series = (
             *waves.rate(rates_at),
             *(path[1:] - path[0]),
             *(scale * o[name] for name, scale in self._scales.items()),
             *(() if lateness is None else (_LATENESS_SCALE * lateness.seconds,)),
+            *(_PREVIEW_SCALE * foretold),
             _SURPRISE_SCALE * surprise,
         )
         z = self._observer.state()
