@@ -85,6 +85,9 @@ class AFrameHeaveEnv(gymnasium.Env[npt.NDArray[np.float32], npt.NDArray[np.float
     | 8 | mass of the load, in air, as told | kg | 0 ... 1e7 |
     | 9 | unstretched rope length at the start | m | 0 ... 1e5 |
 
+    With `Sensors(preview=Preview())`, as in the task Preview, the heave of the pulley that a wave radar foretells comes
+    after these, m, ±100: at 0.5 s, 1 s, ... 15 s from now, in all `Box(40,) float32`.
+
     ## Reward
     Minus the integral of (x_L3 - h)² over the control step, m² s: the return of an episode is exactly -Ω1, eq. (31).
 
