@@ -146,9 +146,7 @@ def _predictive(name: str, sensed: bool, adapts: bool = False) -> PolicySpec:
             horizon = PREVIEW_HORIZON
         elif not context.nominal.is_light:
             horizon = SLOW_HORIZON
-        return PredictiveControl(
-            PlanningConfig(sensors=sensors, horizon=horizon, waves=context.waves, adapts=adapts)
-        )
+        return PredictiveControl(PlanningConfig(sensors=sensors, horizon=horizon, waves=context.waves, adapts=adapts))
 
     return PolicySpec(name, build)
 
