@@ -74,7 +74,11 @@ def test_a_policy_meets_the_committed_figures(spec):
             np.testing.assert_allclose(values / still, figures / still, rtol=0.0, atol=ELSEWHERE[name])
 
 
-@pytest.mark.parametrize("folder", SPECIALISTS, ids=lambda folder: Path(folder).name)
+@pytest.mark.parametrize(
+    "folder",
+    [pytest.param(each, marks=() if each.endswith("apg-storm") else pytest.mark.slow) for each in SPECIALISTS],
+    ids=lambda folder: Path(folder).name,
+)
 def test_an_agent_of_a_task_meets_its_row_of_the_leaderboard(folder):
     task, specs = find_task(Path(folder).name.rpartition("-")[2]), choose_all([folder])
     config, scenarios = TaskConfig(**task.arguments), task.scenarios("test", 100)
