@@ -98,8 +98,8 @@ class DynamicCase:
             raise InvalidValue("strokes: must be None with elastic servomotors, as only rigid ones have a given length")
         if self.scenario.luffing is not None:
             self.scenario.luffing.require_rigid_servomotors(self.scenario.crane.frame)
-        if self.scenario.luffing is not None and self.strokes is not None:
-            raise InvalidValue("strokes: must be None with luffing, which has strokes of its own")
+            if self.strokes is not None:
+                raise InvalidValue("strokes: must be None with luffing, which has strokes of its own")
 
 
 @dataclass(frozen=True, kw_only=True)

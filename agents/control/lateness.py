@@ -12,6 +12,8 @@ from typing import Final
 
 import numpy as np
 
+from aframe_env.scenario.sensors import Sensors
+from aframe_env.validation import InvalidValue
 from agents.control.filters import ALL, FloatArray, Rows
 
 SMOOTHING: Final = 0.5
@@ -20,6 +22,12 @@ DOUBT: Final = 0.02
 """Σ u'², m²/s⁴, by which the readings weigh as much as the assumption that all is as told."""
 MOST: Final = 0.5
 """Most that is reckoned with, either way, s."""
+
+
+def require_readings(adapts: bool, sensors: Sensors | None) -> None:
+    """Raise where lateness is to be reckoned, but the full state is observed."""
+    if adapts and sensors is None:
+        raise InvalidValue("adapts = True: it takes sensors, and the full state is observed: must be False")
 
 
 class Lateness:

@@ -9,6 +9,7 @@ from aframe_env.scenario.sensors import Sensors
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import ALL, FloatArray, Rows
 from agents.control.kalman import RopeFilter, WaveBank, WaveFilter
+from agents.control.lateness import Lateness, require_readings
 from agents.control.regulator import Columns, HoistBatch
 
 
@@ -18,10 +19,13 @@ class KalmanObserver:
     Kalman filters of the pulley, as a bank of waves, and of the load, bobbing on its rope.
 
     The rope's model carries the estimates over the delay, with the drums' turns meanwhile and the predicted motion of
-    the pulleys.
+    the pulleys. One that adapts tells the pulleys' motion as much further ahead as readings and winches are later than
+    told.
     """
 
-    def __init__(self, hoists: HoistBatch, damping_ratio: float, sensors: Sensors, waves: ExpectedWaves) -> None:
+    def __init__(
+        self, hoists: HoistBatch, damping_ratio: float, sensors: Sensors, waves: ExpectedWaves, adapts: bool = False
+    ) -> None:
         """``damping_ratio`` of the loads' bobbing, share of critical.
 
         ``sensors`` and ``waves``: delay, noise and motion that the filters are designed for.
@@ -36,11 +40,14 @@ class KalmanObserver:
         self._tension = sensors.tension
         self.waves = WaveFilter(rows, hoists.period, hold, bank)
         self.load = RopeFilter(rows, bank.rate_noise)
+        self.lateness = Lateness(rows, hoists.period, len(self._turns)) if adapts else None
         self._heave_rate, self._drum_angle, self._first_angle, self._depth_error = np.zeros((4, rows))
 
     def start(self, o: Columns, rows: Rows = ALL) -> None:
         """Begin hoists, as ``hoists`` has, in these rows with the first readings (n,)."""
         self.model.replace(rows, self._hoists.model(self._damping_ratio, rows))
+        if self.lateness is not None:
+            self.lateness.start(rows)
         self._turns[:, rows] = 0.0
         self._start(o, rows)
 
@@ -51,6 +58,9 @@ class KalmanObserver:
 
     def advance(self, turned: FloatArray, o: Columns) -> None:
         """Take the readings a control step later, during which the drums turned by ``turned`` (N,) rad."""
+        if self.lateness is not None:
+            winch = self._hoists.winch
+            self.lateness.advance(winch.radius * winch.speed, winch.radius * o["drum_speed"])
         if len(self._turns):
             self._turns = np.concatenate([self._turns, turned[None]])[1:]
         self._advance(o)
@@ -83,8 +93,9 @@ class KalmanObserver:
         return velocity[0], middle, soon, later
 
     def _times(self, count: int) -> FloatArray:
-        """Now and the ends of the coming control steps, s after the moment of measurement."""
-        return self._hoists.period * np.arange(len(self._turns), len(self._turns) + count, dtype=np.float64)
+        """Now and the ends of the coming control steps, s after the moment of measurement: (count,) or (count, N)."""
+        times = self._hoists.period * np.arange(len(self._turns), len(self._turns) + count, dtype=np.float64)
+        return times if self.lateness is None else times[:, None] + self.lateness.seconds
 
     def _start(self, o: Columns, rows: Rows) -> None:
         model = self._hoists.model(self._damping_ratio, rows)
@@ -113,6 +124,8 @@ class KalmanObserver:
 
 class StateObserver:
     """What ``KalmanObserver`` tells, from observations of the full state: only the path to come is an estimate."""
+
+    lateness = None
 
     def __init__(self, hoists: HoistBatch, damping_ratio: float, waves: ExpectedWaves) -> None:
         self._hoists = hoists
@@ -169,8 +182,11 @@ class StateObserver:
 Observer = KalmanObserver | StateObserver
 
 
-def observer_for(hoists: HoistBatch, damping_ratio: float, sensors: Sensors | None, waves: ExpectedWaves) -> Observer:
-    """Observer of hoists with these sensors; None where the full state is observed."""
+def observer_for(
+    hoists: HoistBatch, damping_ratio: float, sensors: Sensors | None, waves: ExpectedWaves, adapts: bool = False
+) -> Observer:
+    """Observer of hoists with these sensors; None where the full state is observed, which is never late."""
+    require_readings(adapts, sensors)
     if sensors is None:
         return StateObserver(hoists, damping_ratio, waves)
-    return KalmanObserver(hoists, damping_ratio, sensors, waves)
+    return KalmanObserver(hoists, damping_ratio, sensors, waves, adapts)

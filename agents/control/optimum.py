@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from typing import Final
 
 import numpy as np
@@ -99,11 +100,11 @@ def optimise(
         commands = required_commands(chosen, config) if start is None else start[begin : begin + CHUNK]
         if commands.shape != (len(chosen), config.steps):
             raise InvalidValue(f"start of shape {commands.shape}: must be ({len(chosen)}, {config.steps}), rad/s")
-        found = _optimise(chosen, config, commands, rounds)
+        still = _simulate(chosen, config, np.zeros_like(commands))
+        starts = [_simulate(chosen, config, commands)]
         if start is None and not all(scenario.is_light for scenario in chosen):
-            for other in (np.zeros_like(commands), _followed_commands(chosen, config)):
-                found = _better(found, _optimise(chosen, config, other, rounds))
-        parts.append(found)
+            starts += [still.rows(np.arange(len(chosen))), _follow(chosen, config)]
+        parts.append(reduce(_better, (_optimise(chosen, config, each, still, rounds) for each in starts)))
         if progress is not None:
             progress(begin + len(chosen))
     return Optimum(
@@ -152,19 +153,6 @@ def saturating(scenarios: Sequence[Scenario], config: TaskConfig | None = None) 
     return np.asarray(too_fast | too_sudden)
 
 
-def _followed_commands(scenarios: Sequence[Scenario], config: TaskConfig) -> FloatArray:
-    """Commands (N, n) rad/s of the policy "inverse dynamics", which looks at what has become of the load."""
-    policy, rows = InverseDynamics(), np.arange(len(scenarios))
-    simulation = Simulation(len(scenarios), config.replaced(scenario=scenarios[0], observation="state"))
-    simulation.reset_rows(rows, [(scenario, 0) for scenario in scenarios])
-    policy.reset(scenarios, config.control_period)
-    commands = np.empty((len(scenarios), config.steps))
-    for step in range(config.steps):
-        commands[:, step] = policy.act(simulation.observe(), step * config.control_period)
-        simulation.advance(commands[:, step])
-    return commands
-
-
 @dataclass
 class CommandSequence:
     """Play commands that were found for each scenario."""
@@ -186,8 +174,10 @@ class CommandSequence:
         return np.asarray(self.commands[:, round(time / self._period)])
 
 
-def _optimise(scenarios: Sequence[Scenario], config: TaskConfig, commands: FloatArray, rounds: int) -> Optimum:
-    best, drum_still = (_simulate(scenarios, config, each) for each in (commands, np.zeros_like(commands)))
+def _optimise(
+    scenarios: Sequence[Scenario], config: TaskConfig, best: _Trial, drum_still: _Trial, rounds: int
+) -> Optimum:
+    """Go on from the trial ``best``, which is made better in place."""
     # Commands that part the rope are nowhere to go on from; where a drum left still parts it, too, nothing is.
     lost = np.flatnonzero(np.isinf(best.omega1))
     best.put(lost, drum_still, lost)
@@ -220,13 +210,28 @@ def _optimise(scenarios: Sequence[Scenario], config: TaskConfig, commands: Float
 
 def _simulate(scenarios: Sequence[Scenario], config: TaskConfig, commands: FloatArray) -> _Trial:
     """Run the engine with commands (M, n)."""
-    count, steps = commands.shape
+    return _play(scenarios, config, lambda simulation, step: commands[:, step])
+
+
+def _follow(scenarios: Sequence[Scenario], config: TaskConfig) -> _Trial:
+    """Run the engine with the policy "inverse dynamics", which looks at what has become of the load."""
+    policy, period = InverseDynamics(), config.control_period
+    policy.reset(scenarios, period)
+    return _play(scenarios, config, lambda simulation, step: policy.act(simulation.observe(), step * period))
+
+
+def _play(
+    scenarios: Sequence[Scenario], config: TaskConfig, command: Callable[[Simulation, int], FloatArray]
+) -> _Trial:
+    """Run the engine with the commands (M,) rad/s that are given at each step."""
+    count, steps = len(scenarios), config.steps
     simulation = Simulation(count, config.replaced(scenario=scenarios[0], observation="state"))
     simulation.reset_rows(np.arange(count), [(scenario, 0) for scenario in scenarios])
     columns = (task.DEPTH_ERROR, task.LOAD_VELOCITY_Z, task.DRUM_SPEED)
-    histories = np.empty((steps + 1, count, len(columns)))
+    histories, commands = np.empty((steps + 1, count, len(columns))), np.empty((count, steps))
     histories[0] = simulation.state[:, columns]
     for step in range(steps):
+        commands[:, step] = command(simulation, step)
         simulation.advance(commands[:, step])
         histories[step + 1] = simulation.state[:, columns]
     parted = simulation.results[:, task.PARTED] > 0.0

@@ -16,11 +16,11 @@ import numpy as np
 from aframe_env.scenario import Scenario, ScenarioDistribution
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
-from aframe_env.validation import InvalidValue, require_integer, require_number
+from aframe_env.validation import require_integer, require_number
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import ALL, Rows
 from agents.control.interior_point import BoundedTracking
-from agents.control.lateness import Lateness
+from agents.control.lateness import require_readings
 from agents.control.lift import Lift
 from agents.control.observer import observer_for
 from agents.control.previewed_path import PreviewedPath
@@ -60,8 +60,7 @@ class PlanningConfig:
         require_number("effort", self.price, "s²", low=1e-8, high=1e8)
         require_integer("horizon", self.horizon, low=2, high=1000)
         require_number("damping_ratio", self.damping_ratio, "of critical", low=0.0, high=1.0)
-        if self.adapts and self.sensors is None:
-            raise InvalidValue("adapts = True: it takes sensors, and the full state is observed: must be False")
+        require_readings(self.adapts, self.sensors)
 
     @property
     def price(self) -> float:
@@ -112,9 +111,7 @@ class Planner:
         self._config = config
         self.period = control_period
         self.hoists = HoistBatch(rows, control_period, STATE if config.sensors is None else SENSED)
-        self._observer = observer_for(self.hoists, config.damping_ratio, config.sensors, config.waves)
-        self._delay = 0 if config.sensors is None else round(config.sensors.delay / control_period)
-        self._lateness = Lateness(rows, control_period, self._delay) if config.adapts else None
+        self._observer = observer_for(self.hoists, config.damping_ratio, config.sensors, config.waves, config.adapts)
         self._previewed = PreviewedPath.of(config.sensors, rows, control_period)
         self._turned, self._efforts = np.zeros(rows), np.ones(rows)
         self._k, self._cost_to_go = np.zeros((rows, 4)), np.zeros((rows, 4, 4))
@@ -123,8 +120,6 @@ class Planner:
         """Begin hoists in these rows with first observations (n, K); return these by their names."""
         o = self.hoists.start(lifts, observation, rows)
         self._observer.start(o, rows)
-        if self._lateness is not None:
-            self._lateness.start(rows)
         if self._previewed is not None:
             self._previewed.take(observation, rows)
         self._tune(rows)
@@ -144,9 +139,7 @@ class Planner:
 
     def advance(self, observation: Observation) -> Columns:
         """Take the observations (N, K) of all rows, one control step later; return them by their names."""
-        o, winch = self.hoists.columns(observation), self.hoists.winch
-        if self._lateness is not None:
-            self._lateness.advance(winch.radius * winch.speed, winch.radius * o["drum_speed"])
+        o = self.hoists.columns(observation)
         self._observer.advance(self._turned, o)
         if self._previewed is not None:
             self._previewed.take(observation)
@@ -154,17 +147,11 @@ class Planner:
 
     def plan(self) -> Plan:
         """The plan, as things stand."""
-        z, winch, horizon = self._observer.state(), self.hoists.winch, self._config.horizon
-        if self._lateness is None:
-            rises = self._observer.rises(horizon)
-        else:
-            ahead = self.period * (self._delay + np.arange(horizon + 1.0))[:, None] + self._lateness.seconds
-            rises = np.diff(self._observer.waves.path(ahead), axis=0)
-            z[:, 3] = self._observer.waves.rate(ahead[:1])[0] - winch.radius * winch.speed
+        rises = self._observer.rises(self._config.horizon)
         if self._previewed is not None:
-            foretold = self._previewed.rises(self._observer.waves, horizon)
+            foretold = self._previewed.rises(self._observer.waves, len(rises))
             rises[: len(foretold)] = foretold
-        return self.plan_for(z, rises.T / self.period, winch.speed)
+        return self.plan_for(self._observer.state(), rises.T / self.period, self.hoists.winch.speed)
 
     def command(self, rope_speed: FloatArray) -> FloatArray:
         """Drum speed commands (N,) rad/s by which the drums pay out at a mean ``rope_speed`` (N,) m/s."""

@@ -19,10 +19,9 @@ from aframe_env.config import TaskConfig
 from aframe_env.scenario import ScenarioDistribution, ScenarioSource
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE, quantities
-from aframe_env.validation import InvalidValue
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import FloatArray
-from agents.control.lateness import Lateness
+from agents.control.lateness import require_readings
 from agents.control.lift import Lift
 from agents.control.observer import KalmanObserver, observer_for
 from agents.control.previewed_path import PreviewedPath
@@ -56,8 +55,7 @@ class LookoutConfig:
     """Reckon how much later than told readings and winch are, and look that much further ahead; on sensors alone."""
 
     def __post_init__(self) -> None:
-        if self.adapts and self.sensors is None:
-            raise InvalidValue("adapts = True: it takes sensors, and the full state is observed: must be False")
+        require_readings(self.adapts, self.sensors)
 
     @classmethod
     def of(cls, task: TaskConfig) -> LookoutConfig:
@@ -113,7 +111,7 @@ class Lookout:
 
     def __init__(self, rows: int, config: LookoutConfig) -> None:
         self._hoists = HoistBatch(rows, config.control_period, STATE if config.sensors is None else SENSED)
-        self._observer = observer_for(self._hoists, DAMPING_RATIO, config.sensors, config.waves)
+        self._observer = observer_for(self._hoists, DAMPING_RATIO, config.sensors, config.waves, config.adapts)
         self._previewed = PreviewedPath.of(config.sensors, rows, config.control_period)
         self._scales = _SENSED_SCALES if config.sensors else _STATE_SCALES
         self._period = config.control_period
@@ -121,8 +119,7 @@ class Lookout:
         delay = config.delay * self._period
         self._rates_at = delay + np.array(RATES_AHEAD)
         self._rises_at = delay + np.array((0.0, *RISES_AHEAD))
-        self._step_at = delay + np.array((0.0, self._period))
-        self._lateness = Lateness(rows, self._period, config.delay) if config.adapts else None
+        self._step_ends_at = delay + np.array((self._period,))
         self.turned = np.zeros(rows)
         """(N,) rad: turn of the drums in the latest control step, as reckoned."""
         self.figures = np.zeros((rows, len(FIGURES)), dtype=np.float32)
@@ -182,9 +179,6 @@ class Lookout:
         """Take the observations (N, K), one control step later."""
         o = self._hoists.columns(observation)
         foretold = self._observer.waves.rate(np.array([self._period]))[0]
-        if self._lateness is not None:
-            radius = self._hoists.winch.radius
-            self._lateness.advance(radius * self._hoists.winch.speed, radius * o["drum_speed"])
         self._observer.advance(self.turned, o)
         return self._look(observation, o, o["pulley_velocity_z"] - foretold)
 
@@ -204,10 +198,10 @@ class Lookout:
         return command
 
     def _look(self, observation: Observation, o: Columns, surprise: FloatArray) -> Outlook:
-        waves, winch, lateness = self._observer.waves, self._hoists.winch, self._lateness
-        rates_at, rises_at, step_at = self._rates_at, self._rises_at, self._step_at
+        waves, winch, lateness = self._observer.waves, self._hoists.winch, self._observer.lateness
+        rates_at, rises_at, ends_at = self._rates_at, self._rises_at, self._step_ends_at
         if lateness is not None:
-            rates_at, rises_at, step_at = (each[:, None] + lateness.seconds for each in (rates_at, rises_at, step_at))
+            rates_at, rises_at, ends_at = (each[:, None] + lateness.seconds for each in (rates_at, rises_at, ends_at))
         path = waves.path(rises_at)
         foretold = np.zeros((0, len(surprise)))
         if self._previewed is not None:
@@ -223,9 +217,6 @@ class Lookout:
         )
         z = self._observer.state()
         rise = self._observer.rises(1)[0] / self._period
-        speed, rope_speed = waves.rate(step_at), winch.radius * winch.speed
-        if lateness is not None:
-            z[:, 3] = speed[0] - rope_speed
-            rise = np.diff(waves.path(step_at), axis=0)[0] / self._period
-        rise = np.where(winch.lag > 0.0, speed[1], rise)
-        return Outlook(np.stack(series, axis=1).astype(np.float32), z, rise, rope_speed)
+        if (winch.lag > 0.0).any():
+            rise = np.where(winch.lag > 0.0, waves.rate(ends_at)[0], rise)
+        return Outlook(np.stack(series, axis=1).astype(np.float32), z, rise, winch.radius * winch.speed)

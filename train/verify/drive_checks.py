@@ -125,12 +125,7 @@ def torque_drive() -> Check:
         measured=f"{1e6 * load:.2f} µm; {worst:.4%}",
         passed=load <= 1e-5 and worst <= 1e-3,
         rows=[
-            Row(
-                quantity=f"{what}, peak-to-peak",
-                measured=f"{np.ptp(ours):.6g}",
-                reference=f"{np.ptp(theirs):.6g}",
-                error=f"{error:.4%}",
-            )
+            Row.of_ranges(what, ours, theirs, f"{error:.4%}")
             for what, ours, theirs, error in zip(
                 ("load, m", "drum angle, rad", "drum speed, rad/s", "tension, N", "torque, N m", "power, W"),
                 here,

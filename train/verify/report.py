@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+import numpy.typing as npt
+
 from train.shared.markdown import table
+
+FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,6 +21,16 @@ class Row:
     measured: str
     reference: str
     error: str
+
+    @classmethod
+    def of_ranges(cls, column: str, here: FloatArray, there: FloatArray, error: str) -> Row:
+        """Peak-to-peak of a history (k,) beside that of its reference."""
+        return cls(
+            quantity=f"{column}, peak-to-peak",
+            measured=f"{np.ptp(here):.6g}",
+            reference=f"{np.ptp(there):.6g}",
+            error=error,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
