@@ -97,7 +97,8 @@ class JobStore(Generic[Result]):
     def _errors(self, words: str = "") -> Iterator[None]:
         try:
             yield
-        except sqlite3.Error as error:
+        # Where the words of SQLite quote what is damaged, they need not be UTF-8.
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             raise InvalidValue(f"store = {str(self.path)!r}: {words}{error}") from error
 
     def close(self) -> None:

@@ -294,6 +294,8 @@ def test_no_damage_to_the_file_gives_a_wrong_result_or_hides_one(tmp_path, capsy
     @hypothesis.given(
         place=st.integers(0, len(whole) - 1), seed=st.integers(0, 9), length=st.sampled_from([1, 1, 1, 4, 64, 4096])
     )
+    # A letter of the schema that SQLite's own words then quote, which are no UTF-8.
+    @hypothesis.example(place=3997, seed=0, length=1)
     def damaged(place, seed, length):
         data = bytearray(whole)
         data[place : place + length] = random.Random(seed).randbytes(len(data[place : place + length]))
