@@ -6,6 +6,7 @@ from .scenario.file import read_scenario, read_scenarios, scenario_text
 from .scenario.loads import LOADS, ReadyLoad
 from .scenario.luffing import Luffing
 from .scenario.motion import Harmonic, HarmonicMotion
+from .scenario.motion_unit import MotionUnit
 from .scenario.preview import Preview
 from .scenario.recorded_motion import RecordedMotion, RecordedWindow
 from .scenario.scenario import Scenario
@@ -40,6 +41,7 @@ __all__ = [
     "InvalidValue",
     "LoadShape",
     "Luffing",
+    "MotionUnit",
     "Preview",
     "ReadyLoad",
     "RecordNoiseWarning",

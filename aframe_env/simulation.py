@@ -18,6 +18,7 @@ from aframe_env.flexible_engine import FlexibleEngine, Mesh
 from aframe_env.rfem.model import warn_of_rotation
 from aframe_env.scenario import Scenario, ScenarioSource
 from aframe_env.scenario.motion import require_coverage
+from aframe_env.scenario.motion_unit import Past
 from aframe_env.scenario.preview import PreviewBank, require_foreseeable
 from aframe_env.scenario.sensors import SensorBank
 from aframe_env.validation import InvalidValue, shown
@@ -115,7 +116,8 @@ class Simulation:
         if self._bank is not None:
             truth = self._sensed_truth()
             for index, (scenario, noise_seed) in zip(indices.tolist(), drawn, strict=True):
-                self._bank.reset_row(index, truth[index], noise_seed, scenario.sensor_delay)
+                past = Past.of(scenario) if self._bank.has_motion_unit else None
+                self._bank.reset_row(index, truth[index], noise_seed, scenario.sensor_delay, past)
                 if self._previews is not None:
                     self._previews.start_row(index, scenario, noise_seed)
 

@@ -7,6 +7,7 @@ from aframe_env.scenario.interval import Range
 from aframe_env.scenario.loads import LOADS, ReadyLoad
 from aframe_env.scenario.luffing import Luffing
 from aframe_env.scenario.motion import Harmonic, HarmonicMotion, ShipMotion
+from aframe_env.scenario.motion_unit import MotionUnit
 from aframe_env.scenario.preview import Preview
 from aframe_env.scenario.recorded_motion import RecordedMotion, RecordedWindow
 from aframe_env.scenario.scenario import Initial, Scenario
@@ -30,6 +31,7 @@ __all__ = [
     "Initial",
     "LoadShape",
     "Luffing",
+    "MotionUnit",
     "Preview",
     "Range",
     "ReadyLoad",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from aframe_env.validation import InvalidValue, require_choice, require_instance
 
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
+FloatOrComplex = TypeVar("FloatOrComplex", FloatArray, ComplexArray)
 
 
 class Coordinate(IntEnum):
@@ -33,6 +34,15 @@ class Coordinate(IntEnum):
 
 
 COORDINATES = tuple(c.name.lower() for c in Coordinate)
+
+
+def point_heave(coordinates: FloatOrComplex, position: tuple[float, float, float]) -> FloatOrComplex:
+    """Linear heave (K,) of a point at this ``position`` [m] along the deck's axes.
+
+    Or its rate, for the deck's coordinates or their rates (K, 6).
+    """
+    x, y, _ = position
+    return coordinates[:, Coordinate.HEAVE] + y * coordinates[:, Coordinate.ROLL] - x * coordinates[:, Coordinate.PITCH]
 
 
 @dataclass(frozen=True)

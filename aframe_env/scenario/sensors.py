@@ -13,6 +13,8 @@ import numpy.typing as npt
 from aframe_env.dynamics.compiling import kernel
 from aframe_env.dynamics.random import normal
 from aframe_env.memory import require_memory
+from aframe_env.scenario import motion_unit
+from aframe_env.scenario.motion_unit import MotionUnit, MotionUnitBank, Past
 from aframe_env.scenario.preview import Preview
 from aframe_env.validation import InvalidValue, require_instance, require_number, shown
 
@@ -78,6 +80,9 @@ class Sensors:
     """N."""
     depth_error: Channel = field(default_factory=lambda: Channel(noise=0.05, period=1.0, resolution=0.01))
     """x_L3 - h, m."""
+    motion_unit: MotionUnit | None = None
+    """Errors of a real motion reference unit, which reads heave, heave rate, roll and pitch: before the noise of these
+    channels. None: it has none."""
 
     def __post_init__(self) -> None:
         require_number("delay", self.delay, "s", low=0.0, high=10.0)
@@ -87,6 +92,8 @@ class Sensors:
             require_instance("preview", self.preview, Preview)
         for name in CHANNELS:
             require_instance(name, getattr(self, name), Channel)
+        if self.motion_unit is not None:
+            require_instance("motion_unit", self.motion_unit, MotionUnit)
 
     @classmethod
     def transponder(cls, depth: float, **changes: Any) -> Sensors:
@@ -130,19 +137,29 @@ class SensorBank:
         self._memory = np.zeros((rows, 0, len(CHANNELS)))
         """(rows, past control steps with the newest first, channels)."""
         self._set_delay(slice(None), None)
-        self._error = np.zeros((rows, len(CHANNELS)))
+        self._error = np.zeros((rows, len(CHANNELS) + (motion_unit.STATE if sensors.motion_unit else 0)))
+        """(rows, channels) errors of the channels, and behind them the state of the motion reference unit."""
+        self._unit: MotionUnitBank | None = None
+        if sensors.motion_unit is not None:
+            self._unit = MotionUnitBank(sensors.motion_unit, rows, control_period)
         self._reading = np.zeros((rows, len(CHANNELS)))
         self._seed = np.zeros(rows, dtype=np.uint64)
         self._count = np.zeros(rows, dtype=np.int64)
 
-    def reset_row(self, index: int, truth: FloatArray, seed: int, delay: float | None = None) -> None:
+    def reset_row(
+        self, index: int, truth: FloatArray, seed: int, delay: float | None = None, past: Past | None = None
+    ) -> None:
         """Start a row that has been at ``truth`` (channels,) for ever, with its own noise.
 
-        ``delay``: from a motion to its reading, s, in the place of the sensors'.
+        ``delay``: from a motion to its reading, s, in the place of the sensors'. ``past``: motion before the start,
+        with the drum still; a motion reference unit alone reckons with it.
         """
         self._set_delay(index, delay)
         self._memory[index] = truth
         self._error[index] = 0.0
+        if self._unit is not None:
+            self._unit.draw(index, seed)
+            self._start_unit(self._unit, index, truth.copy(), past)
         self._seed[index] = seed
         self._count[index] = 0
         self._measure(slice(index, index + 1))
@@ -150,9 +167,31 @@ class SensorBank:
     def measure(self, truth: FloatArray) -> FloatArray:
         """Readings (rows, channels) one control step later, the truth being ``truth`` (rows, channels)."""
         self._memory[:, 1:] = self._memory[:, :-1].copy()
-        self._memory[:, 0] = truth
+        if self._unit is None:
+            self._memory[:, 0] = truth
+            self._measure(slice(None))
+            return self._reading
+        state, last = self._error[:, len(CHANNELS) :], self._reading[:, : motion_unit.READ].copy()
+        self._memory[:, 0] = self._unit.sense(truth, state, self._count)
         self._measure(slice(None))
+        out = self._unit.out(state)
+        self._reading[out, : motion_unit.READ] = last[out]
         return self._reading
+
+    def _start_unit(self, unit: MotionUnitBank, index: int, truth: FloatArray, past: Past | None) -> None:
+        """Start the motion reference unit of a row, and fill its memory with what it has told."""
+        unit.start(index, self._error[index, len(CHANNELS) :], truth, past)
+        self._memory[index] = truth
+        if past is not None:
+            steps = self._memory.shape[1] - 1
+            self._memory[index, 1:, : motion_unit.READ] += unit.before(index, past, steps)
+            # With the drum still the load goes with the pulley.
+            self._memory[index, 1:, CHANNELS.index("depth_error")] += past.change(past.heave, self._period, steps)
+
+    @property
+    def has_motion_unit(self) -> bool:
+        """Whether motion before the start is reckoned with."""
+        return self._unit is not None
 
     @property
     def readings(self) -> FloatArray:
@@ -179,6 +218,8 @@ class SensorBank:
         past = min(len(memory), self._memory.shape[1])
         self._memory[index, :past] = memory[:past]
         self._seed[index], self._count[index] = state[3:]
+        if self._unit is not None:
+            self._unit.draw(index, int(self._seed[index]))
 
     def _set_delay(self, index: int | slice, delay: float | None) -> None:
         """Let the readings of a row, or of some, be so late, s, and all memories be long enough."""

@@ -13,19 +13,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
-from typing import Final, TypeVar
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from aframe_env.scenario import Scenario, ScenarioDistribution, ScenarioSource
 from aframe_env.scenario.crane import Crane
-from aframe_env.scenario.motion import ComplexArray, Coordinate, has_components, is_tabled
+from aframe_env.scenario.motion import FloatOrComplex, has_components, is_tabled, point_heave
 from aframe_env.scenario.sea import SeaMotion
 from aframe_env.validation import InvalidValue, require_number
 from agents.control.filters import FloatArray
-
-FloatOrComplex = TypeVar("FloatOrComplex", FloatArray, ComplexArray)
 
 SEED: Final = 3_000_017
 """Seed of the scenarios that the spectrum is the mean of."""
@@ -133,8 +131,7 @@ def _another(scenario: Scenario, seed: int) -> Scenario:
 
 def pulley_heave(coordinates: FloatOrComplex, crane: Crane) -> FloatOrComplex:
     """Linear heave (K,) of the crane's pulley, or its rate, for the deck's coordinates or rates (K, 6)."""
-    x, y, _ = crane.pulley_position
-    return coordinates[:, Coordinate.HEAVE] + y * coordinates[:, Coordinate.ROLL] - x * coordinates[:, Coordinate.PITCH]
+    return point_heave(coordinates, crane.pulley_position)
 
 
 def _spectra(scenarios: Iterable[Scenario]) -> Iterable[tuple[FloatArray, FloatArray]]:
