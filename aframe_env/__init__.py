@@ -16,7 +16,7 @@ from aframe_env.neighbours import in_the_way, overwritten
 __version__ = "0.1.0"
 ENV_ID = "AFrameHeave-v0"
 
-_SUITE = {f"AFrameHeave-{name}-v0": {"task": name} for name in ("Storm", "Unknown", "DeepRope", "Preview")}
+_SUITE = {f"AFrameHeave-{name}-v0": {"task": name} for name in ("Storm", "Unknown", "DeepRope", "Preview", "MRU")}
 """Ids of the tasks in ``aframe_env.suite``, which an import has no time to ask."""
 
 for _id, _arguments in {ENV_ID: {}, **_SUITE}.items():

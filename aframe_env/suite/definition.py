@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Final, Literal
 
 from aframe_env.scenario import Scenario, ScenarioDistribution
@@ -84,6 +84,10 @@ class Task:
     def digest(self, split: Split) -> str:
         """Digest of the split's first scenarios as they are drawn now."""
         facts = [_facts(scenario) for scenario in self.scenarios(split, SEALED)]
+        unit = self.distribution.sensors.motion_unit
+        if unit is not None:
+            # What is drawn of a motion unit goes by the noise of the sensors: its figures and the seed are all.
+            facts.append([*(f"{name} = {value}" for name, value in asdict(unit).items()), f"seed = {self.seed(split)}"])
         return hashlib.sha256(json.dumps(facts).encode()).hexdigest()
 
     def require_frozen(self, split: Split) -> str:
