@@ -34,7 +34,13 @@ def strict_converter() -> Converter:
             raise InvalidValue(f"{shown(value)}: must be of type {kind.__name__}")
         return value
 
+    def number_or_pair(value: Any, _: Any) -> float | tuple[float, float]:
+        if isinstance(value, list | tuple):
+            return converter.structure(value, tuple[float, float])
+        return converter.structure(value, float)
+
     converter.register_structure_hook(float, number)
+    converter.register_structure_hook_func(lambda kind: kind == float | tuple[float, float], number_or_pair)
     for kind in (int, bool, str):
         converter.register_structure_hook(kind, exactly)
     return converter

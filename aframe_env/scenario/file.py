@@ -24,7 +24,7 @@ Files that are named within are looked for beside the scenario file.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -180,10 +180,7 @@ def _converter(folder: Path) -> Converter:
         table = converter.structure(rest, _SeaMotion)
         return SeaMotion(sea=table.sea, vessel=_vessel(table.vessel, table.deck_position, folder))
 
-    def interval(value: Any, _: Any) -> Range:
-        if isinstance(value, list | tuple):
-            return converter.structure(value, tuple[float, float])
-        return converter.structure(value, float)
+    interval: Callable[[Any, Any], Range] = converter.get_structure_hook(Range)
 
     def interval_or_none(value: Any, _: Any) -> Range | None:
         return None if value is None else interval(value, None)
@@ -209,7 +206,6 @@ def _converter(folder: Path) -> Converter:
     converter.register_structure_hook_func(lambda kind: kind == Section, section)
     converter.register_structure_hook_func(lambda kind: kind == ShipMotion, motion)
     converter.register_unstructure_hook(SeaMotion, lambda m: _sea_table(m, converter))
-    converter.register_structure_hook_func(lambda kind: kind == Range, interval)
     converter.register_structure_hook_func(lambda kind: kind == Range | None, interval_or_none)
     converter.register_structure_hook_func(lambda kind: kind == Range | str, peak_enhancement)
     converter.register_unstructure_hook(RecordedMotion, _recorded_table)

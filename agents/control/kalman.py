@@ -22,6 +22,7 @@ import numpy.typing as npt
 from numba import prange
 
 from aframe_env.dynamics.compiling import kernel, parallel_kernel, scalar
+from aframe_env.scenario.motion_unit import MotionUnit
 from aframe_env.scenario.sensors import Sensors
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import ALL, FloatArray, Rows
@@ -31,6 +32,10 @@ LEAST_RATE_NOISE: Final = 0.001
 """Least standard deviation of a reading of the heave rate that is reckoned with, m/s."""
 LEAST_DEPTH_NOISE: Final = 0.001
 """And of the depth, m."""
+
+UNIT_NOISE: Final = 0.1
+"""Standard deviation of the heave rate's errors that a motion reference unit adds to its noise, m/s: what is not known
+of its heave filter, lever arm and drift. Chosen on validation scenarios of the task MRU."""
 
 LEAST_MISFIT: Final = 1e-12
 """Least mean square of the readings' deviations that is reckoned with, as a share of their variance."""
@@ -52,17 +57,26 @@ class WaveBank:
     """Rate at which an oscillator forgets, 1/s."""
     offset_drift: float = 1e-7
     """Variance by which the offset between heave and depth grows, m²/s."""
+    unit: MotionUnit | None = None
+    """Motion reference unit whose heave filter the readings have passed; None: they are the pulley's heave rate."""
+
+    @property
+    def finds(self) -> bool:
+        """Whether the readings at the start count, for ``WaveFilter.find``: of a unit on a ship that moves already."""
+        return self.unit is not None and not self.waves.build_up
 
     @classmethod
     def of(cls, waves: ExpectedWaves, sensors: Sensors | None) -> WaveBank:
         """Bank for readings of these sensors; None for an exact heave rate alone, with which no depth is read."""
         if sensors is None:
             return cls(waves=waves, rate_noise=LEAST_RATE_NOISE, depth_noise=math.inf)
-        rate, depth = sensors.heave_rate, sensors.depth_error
+        rate, depth, unit = sensors.heave_rate, sensors.depth_error, sensors.motion_unit
+        rate_noise = math.hypot(rate.noise, rate.resolution / math.sqrt(12.0))
         return cls(
             waves=waves,
-            rate_noise=max(LEAST_RATE_NOISE, math.hypot(rate.noise, rate.resolution / math.sqrt(12.0))),
+            rate_noise=max(LEAST_RATE_NOISE, rate_noise if unit is None else math.hypot(rate_noise, UNIT_NOISE)),
             depth_noise=max(LEAST_DEPTH_NOISE, math.hypot(depth.noise, depth.resolution / math.sqrt(12.0))),
+            unit=unit,
         )
 
 
@@ -94,6 +108,8 @@ def schedule(bank: WaveBank, period: float, hold: int) -> Schedule:
     (kinds, bands), build_up = variances.shape, bank.waves.build_up
     transition = np.exp(exponent * period)
     rate = np.append(np.tile([1.0, 0.0], bands), 0.0)
+    if bank.unit is not None:
+        rate[:-1] = np.stack([passed(bank).real, -passed(bank).imag], axis=1).ravel()
     inverse = 1.0 / exponent
     depth = np.append(np.stack([inverse.real, -inverse.imag], axis=1).ravel(), 1.0)
     # It is the rates that are stirred: a displacement does not jump.
@@ -114,6 +130,7 @@ def schedule(bank: WaveBank, period: float, hold: int) -> Schedule:
             np.stack([rate, depth]),
             (bank.rate_noise**2, bank.depth_noise**2),
             hold,
+            0 if bank.finds else 1,
             gains[:, kind],
             spread[kind],
         )
@@ -127,6 +144,12 @@ def exponents(bank: WaveBank) -> ComplexArray:
     return np.asarray(-bank.damping + 1j * np.array(bank.waves.frequency), dtype=np.complex128)
 
 
+def passed(bank: WaveBank) -> ComplexArray:
+    """Shares (bands,) of the oscillators' heave rates that are read: all of them, but for the unit's heave filter."""
+    exponent = exponents(bank)
+    return np.ones_like(exponent) if bank.unit is None else bank.unit.passed(exponent)
+
+
 class WaveFilter:
     """Estimate and prediction of the pulley's heave, for N rows."""
 
@@ -135,6 +158,9 @@ class WaveFilter:
         self._schedule = schedule(bank, control_period, hold)
         self._exponent = exponents(bank)
         self._transition = np.append(np.exp(self._exponent * control_period), 1.0)
+        self._passed = passed(bank)
+        self.finds = bank.finds
+        """Whether ``find`` is to follow on ``start``."""
         kinds, parts = self._schedule.rate.shape[1:]
         self._of_kinds = np.zeros((rows, kinds, parts), dtype=np.complex128)
         """For each kind of sea the heave rate is the sum of the real parts of all but the last, m/s; the last is the
@@ -147,7 +173,7 @@ class WaveFilter:
         """Sum of the logarithms of these variances."""
         self.probability = np.full((rows, kinds), 1.0 / kinds)
         """(N, M) of each kind of sea, by the readings so far."""
-        self._step = np.zeros(rows, dtype=np.int64)
+        self._step, self._heard = np.zeros((2, rows), dtype=np.int64)
 
     def start(self, rows: Rows = ALL) -> None:
         """Begin in these rows with a ship at rest."""
@@ -157,18 +183,31 @@ class WaveFilter:
         self._log_spread[rows] = 0.0
         self.probability[rows] = 1.0 / self.probability.shape[1]
         self._step[rows] = 0
+        self._heard[rows] = 0
 
-    def advance(self, heave_rate: FloatArray) -> None:
-        """Take a reading (N,) m/s of the pulley's heave rate, a control step later."""
+    def find(self, heave_rate: FloatArray, depth: FloatArray, rows: Rows = ALL) -> None:
+        """Take the readings (n,) of heave rate [m/s] and heave by the depth [m] at the start of these rows."""
+        first, turned, state = self._schedule, 1.0 / self._exponent, self._of_kinds[rows]
+        state += heave_rate[:, None, None] * first.rate[0]
+        heave = (state[..., :-1] * turned).real.sum(axis=2) + state[..., -1].real
+        state += (depth[:, None] - heave)[..., None] * first.depth[0]
+        self._of_kinds[rows], self._state[rows] = state, state.mean(axis=1)
+
+    def advance(self, heave_rate: FloatArray, heard: npt.NDArray[np.bool_] | None = None) -> None:
+        """Take a reading (N,) m/s of the pulley's heave rate, a control step later; where it is ``heard`` (N,)."""
+        heard = np.ones(len(heave_rate), dtype=np.bool_) if heard is None else heard
         self._step += 1
+        self._heard += heard
         _kernels().advance(
             self._of_kinds,
             self._transition,
+            self._passed,
             heave_rate,
+            heard,
             self._schedule.rate,
             self._schedule.spread,
             self._schedule.index(self._step),
-            self._step,
+            self._heard,
             self._misfit,
             self._log_spread,
             self.probability,
@@ -265,11 +304,11 @@ def _weigh(misfit: FloatArray, log_spread: FloatArray, readings: int, probabilit
 @cache
 def _kernels() -> _Kernels:
     @kernel
-    def recurse(start, transition, stir, grow, drift, rows, noise, hold, gains, spread):  # type: ignore[no-untyped-def]
+    def recurse(start, transition, stir, grow, drift, rows, noise, hold, first, gains, spread):  # type: ignore[no-untyped-def]
         parts, bands = start.shape[0], transition.shape[0]
         covariance = np.diag(start)
         cross = np.empty(parts)
-        for step in range(1, spread.shape[0]):
+        for step in range(first, spread.shape[0]):
             # A turn of each oscillator, on the rows and then on the columns.
             for i in range(bands):
                 c, s = transition[i].real, transition[i].imag
@@ -302,7 +341,19 @@ def _kernels() -> _Kernels:
 
     @parallel_kernel
     def advance(  # type: ignore[no-untyped-def]
-        of_kinds, transition, reading, gain, spread, index, readings, misfit, log_spread, probability, state
+        of_kinds,
+        transition,
+        passed,
+        reading,
+        heard,
+        gain,
+        spread,
+        index,
+        readings,
+        misfit,
+        log_spread,
+        probability,
+        state,
     ):
         kinds, parts = of_kinds.shape[1:]
         for row in prange(of_kinds.shape[0]):
@@ -312,12 +363,15 @@ def _kernels() -> _Kernels:
                 for part in range(parts):
                     of_kinds[row, kind, part] *= transition[part]
                     if part < parts - 1:
-                        deviation -= of_kinds[row, kind, part].real
+                        deviation -= (passed[part] * of_kinds[row, kind, part]).real
+                if not heard[row]:
+                    continue
                 for part in range(parts):
                     of_kinds[row, kind, part] += deviation * gain[at, kind, part]
                 misfit[row, kind] += deviation * deviation / spread[at, kind]
                 log_spread[row, kind] += math.log(spread[at, kind])
-            _weigh(misfit[row], log_spread[row], readings[row], probability[row])
+            if heard[row]:
+                _weigh(misfit[row], log_spread[row], readings[row], probability[row])
             _mix(of_kinds[row], probability[row], state[row])
 
     @parallel_kernel

@@ -37,11 +37,11 @@ class KalmanObserver:
         self._turns = np.zeros((round(sensors.delay / hoists.period), rows))
         """(steps of delay, N) turns of the drums since the moment of measurement, rad."""
         bank = WaveBank.of(waves, sensors)
-        self._tension = sensors.tension
+        self._tension, self._unit = sensors.tension, sensors.motion_unit
         self.waves = WaveFilter(rows, hoists.period, hold, bank)
         self.load = RopeFilter(rows, bank.rate_noise)
         self.lateness = Lateness(rows, hoists.period, len(self._turns)) if adapts else None
-        self._heave_rate, self._drum_angle, self._first_angle, self._depth_error = np.zeros((4, rows))
+        self._heave_rate, self._true_rate, self._drum_angle, self._first_angle, self._depth_error = np.zeros((5, rows))
 
     def start(self, o: Columns, rows: Rows = ALL) -> None:
         """Begin hoists, as ``hoists`` has, in these rows with the first readings (n,)."""
@@ -103,6 +103,12 @@ class KalmanObserver:
         self.waves.start(rows)
         self._heave_rate[rows], self._drum_angle[rows] = o["pulley_velocity_z"], o["drum_angle"]
         self._first_angle[rows], self._depth_error[rows] = o["drum_angle"], 0.0
+        self._true_rate[rows] = o["pulley_velocity_z"]
+        if self.waves.finds:
+            # A ship that moves already has the load off its level by the heave, and the first readings tell.
+            self.waves.find(o["pulley_velocity_z"], o["depth_error"], rows)
+            self._true_rate[rows] = self.waves.rate(np.zeros(1))[0][rows]
+            self._depth_error[rows] = self.waves.heave()[rows]
 
     def _stretch_noise(self, rows: Rows) -> FloatArray:
         """Standard deviation (n,) m of a reading of the ropes' stretch."""
@@ -113,9 +119,15 @@ class KalmanObserver:
     def _advance(self, o: Columns) -> None:
         radius, heave_rate, drum_angle = self._hoists.winch.radius, o["pulley_velocity_z"], o["drum_angle"]
         paid_out = radius * (drum_angle - self._drum_angle)
-        speed = 0.5 * (heave_rate + self._heave_rate) - paid_out / self._hoists.period
-        self._heave_rate, self._drum_angle = heave_rate, drum_angle
-        self.waves.advance(heave_rate)
+        if self._unit is None:
+            self.waves.advance(heave_rate)
+            true_rate = heave_rate
+        else:
+            # In a dropout the last reading stays, to the bit.
+            self.waves.advance(heave_rate, heave_rate != self._heave_rate)
+            true_rate = self.waves.rate(np.zeros(1))[0]
+        speed = 0.5 * (true_rate + self._true_rate) - paid_out / self._hoists.period
+        self._heave_rate, self._true_rate, self._drum_angle = heave_rate, true_rate, drum_angle
         self.load.advance(speed, self._hoists.stretch(o))
         below = radius * (drum_angle - self._first_angle) + self.load.stretch
         self.waves.correct(o["depth_error"] - self.waves.heave() + below)

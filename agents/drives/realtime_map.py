@@ -108,6 +108,8 @@ class RealTimeMapPolicy:
         bank = replace(WaveBank.of(self.waves, self.sensors), depth_noise=math.inf)
         self._bank = WaveFilter(len(winch.radius), self._period, 1, bank)
         self._bank.start()
+        if self._bank.finds:
+            self._bank.find(o["pulley_velocity_z"], o["depth_error"])
         self._drums = _Drums(winch, self._period, self.sensors, o)
         self._step = 0
 

@@ -21,7 +21,7 @@ from agents.policy import Knowledge
 from agents.rollout import HELD_OUT_SEED, run
 
 IDS = [task.id for task in TASKS.values()]
-STORM, UNKNOWN = TASKS["Storm"], TASKS["Unknown"]
+STORM, UNKNOWN, MRU = TASKS["Storm"], TASKS["Unknown"], TASKS["MRU"]
 
 
 def test_every_task_is_registered_and_nothing_else():
@@ -113,6 +113,17 @@ def test_a_change_of_what_is_drawn_is_noticed(change):
         other.require_frozen("test")
 
 
+@pytest.mark.parametrize(
+    "change", [{"heave_period": (18.0, 22.5)}, {"lever_arm_error": 0.6}, {"dropouts": 2.1}, {"angle_bias": 0.0}]
+)
+def test_a_change_of_what_is_drawn_of_the_motion_unit_is_noticed(change):
+    sensors = MRU.distribution.sensors
+    changed = replace(sensors, motion_unit=replace(sensors.motion_unit, **change))
+    other = replace(MRU, distribution=replace(MRU.distribution, sensors=changed))
+    with pytest.raises(InvalidValue, match=r"AFrameHeave-MRU-v0: the scenarios of the split 'test' have the digest"):
+        other.require_frozen("test")
+
+
 def test_in_storm_most_winches_saturate_and_all_is_told_truly():
     scenarios = STORM.scenarios("test", 100)
     assert 85 <= saturating(scenarios, TaskConfig(**STORM.arguments)).sum() <= 95
@@ -170,3 +181,42 @@ def test_in_unknown_readings_are_as_late_as_is_and_not_as_told():
         late = np.interp(times[100:] - scenario.sensor_delay, times, heave[:, row])
         np.testing.assert_allclose(heard[100:, row], late, atol=1e-5)
         assert scenario.sensor_delay != pytest.approx(0.2, abs=1e-3)
+
+
+def test_in_mru_the_ship_moves_at_the_start_and_the_load_hangs_on_it():
+    rows = gymnasium.make_vec(MRU.id, num_envs=32, vectorization_mode="vector_entry_point")
+    rows.reset(seed=3)
+    state = rows.unwrapped.simulation.state
+    # The load is off its level by the pulley's heave, and goes with it: the rope is as taut as at rest.
+    np.testing.assert_allclose(state[:, 0], state[:, 6], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(state[:, 1], state[:, 7], rtol=0, atol=1e-9)
+    assert state[:, 6].std() > 0.3
+    weights = np.array([scenario.weight for scenario in rows.unwrapped.scenarios])
+    # But for the horizontal way of the pulley, which the drum has not.
+    np.testing.assert_allclose(state[:, 11], weights, rtol=0.3)
+
+
+def test_in_mru_a_policy_comes_by_nothing_but_what_was_told():
+    scenarios, spy = MRU.scenarios("test", 20), Spy()
+    config = TaskConfig(**MRU.arguments)
+    run(spy, scenarios, config, episode_duration=1.0)
+    assert {handed.sensor_delay for handed in spy.handed} == {0.2}
+    true = [scenario.sensor_delay for scenario in scenarios]
+    assert 0.1 <= min(true) < 0.2 < max(true) <= 0.4
+    # Whatever the seed of the noise draws of the unit, what is known of it is the task's.
+    assert config.sensors == MRU.distribution.sensors
+    assert all(handed.motion == each.motion for handed, each in zip(spy.handed, scenarios, strict=True))
+
+
+def test_in_mru_what_is_read_is_not_what_the_pulley_does():
+    rows = gymnasium.make_vec(MRU.id, num_envs=16, vectorization_mode="vector_entry_point")
+    seen, true = [rows.reset(seed=1)[0]], [rows.unwrapped.simulation.state.copy()]
+    for _ in range(599):
+        seen.append(rows.step(np.zeros((16, 1), np.float32))[0])
+        true.append(rows.unwrapped.simulation.state.copy())
+    read, rate = np.array(seen)[:, :, 1], np.array(true)[:, :, 7]
+    errors = (read - rate).std(axis=0) / rate.std(axis=0)
+    assert 0.2 < np.median(errors) < 0.6
+    # A delay or a lead does not mend it, not even the best one in each episode.
+    shifted = [np.roll(read, k, axis=0)[10:-10] - rate[10:-10] for k in range(-10, 11)]
+    assert np.median(np.min([each.std(axis=0) for each in shifted], axis=0) / rate.std(axis=0)) > 0.2

@@ -18,9 +18,9 @@ import pytest
 from rich.console import Console
 
 import agents
-from aframe_env import InvalidValue, Scenario, ScenarioDistribution
+from aframe_env import InvalidValue, MotionUnit, Scenario, ScenarioDistribution
 from aframe_env.scenario.crane import Crane, Rope, Winch
-from agents.learned.agent import LearnedPolicy
+from agents.learned.agent import LearnedPolicy, load
 from agents.policy import DrumStill
 from agents.rollout import held_out_scenarios, run
 from train.export import __main__ as command
@@ -175,6 +175,12 @@ def test_bad_input_is_refused_in_a_sentence(
     predictive = said(capsys, monkeypatch, "predictive-ppo", "--out", str(out))
     assert "quadratic programme" in predictive
     assert "aframe export ppo-sensors" in predictive
+    agent = load("ppo-sensors")
+    assert agent.card.sensors is not None
+    unit = replace(agent.card, sensors=replace(agent.card.sensors, motion_unit=MotionUnit()))
+    with monkeypatch.context() as patched:
+        patched.setattr(command, "load", lambda name: LearnedPolicy(agent.actor, unit))
+        assert "was trained with a motion_unit" in said(capsys, monkeypatch, "ppo-sensors", "--out", str(out))
     monkeypatch.setitem(sys.modules, "onnx", None)
     assert 'is not installed: pip install "aframe-heave[onnx]"' in said(capsys, monkeypatch, "ppo", "--out", str(out))
     assert not out.exists()

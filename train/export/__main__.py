@@ -63,6 +63,12 @@ def exportable(name: str) -> LearnedPolicy:
             f"agent = {name!r}: has limits and lag of the winch among its features, which exported controllers do not "
             "take: must be trained with --no-winch"
         )
+    sensors = agent.card.made_for.sensors
+    if sensors is not None and sensors.motion_unit is not None:
+        raise InvalidValue(
+            f"agent = {name!r}: was trained with a motion_unit, whose heave filter exported controllers do not undo: "
+            "must be trained with motion_unit = None"
+        )
     return agent
 
 

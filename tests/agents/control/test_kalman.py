@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
+from scipy.signal import freqs
 
+from aframe_env.scenario.motion_unit import MotionUnit
 from aframe_env.scenario.sensors import Sensors
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.kalman import ACCELERATION_NOISE, RopeFilter, WaveBank, WaveFilter
@@ -228,3 +230,41 @@ def test_a_bias_of_the_stretch_is_told_from_the_bobbing():
         rope.advance(speed, z[:, 2] - z[:, 0] + bias)
         left.append(rope.stretch[0] - (z[0, 2] - z[0, 0]))
     assert np.abs(left[300:]).max() < 0.25 * bias
+
+
+def washed_out(unit, frequency, times):
+    """Heave rate (T,) of cos(w t), and what a unit reads of it by scipy's word."""
+    cutoff = 2.0 * np.pi / unit.heave_period
+    _, (passed,) = freqs([1.0, 0.0, 0.0], [1.0, 2.0 * unit.heave_damping * cutoff, cutoff**2], [frequency])
+    return np.cos(frequency * times), (passed * np.exp(1j * frequency * times)).real
+
+
+@pytest.mark.parametrize("dropouts", [False, True])
+def test_the_wave_filter_undoes_a_units_heave_filter(dropouts):
+    unit, times = MotionUnit(heave_period=20.0, dropouts=2.0), PERIOD * np.arange(600)
+    waves = replace(WAVES, frequency=(0.4, 0.6, 0.8, 1.0), variances=((0.1, 0.1, 0.1, 0.1),), build_up=0.0)
+    bank = WaveBank(waves=waves, rate_noise=0.02, depth_noise=np.inf)
+    rate, read = washed_out(unit, 0.8, times)
+    heard = np.array([not dropouts or k % 100 < 80 for k in range(600)])
+    for each, error in ((replace(bank, unit=unit), 0.03), (bank, None)):
+        found = WaveFilter(1, PERIOD, 10, each)
+        found.start()
+        if found.finds:
+            found.find(read[:1], np.zeros(1))
+        told = [found.rate(np.zeros(1))[0, 0]]
+        for k in range(1, 600):
+            last = read[k] if heard[k] else 7.0  # what is not heard counts for nothing
+            found.advance(np.array([last]), heard[k : k + 1])
+            told.append(found.rate(np.zeros(1))[0, 0])
+        off = np.abs(np.array(told) - rate)[300:]
+        assert off.max() < error if error else off.max() > 0.4
+
+
+def test_the_first_readings_find_a_moving_ship():
+    unit = MotionUnit()
+    waves = replace(WAVES, build_up=0.0)
+    found = WaveFilter(3, PERIOD, 10, WaveBank(waves=waves, rate_noise=0.02, depth_noise=0.05, unit=unit))
+    found.start()
+    found.find(np.array([0.2]), np.array([1.1]), np.array([1]))
+    assert found.heave()[1] == pytest.approx(1.1, abs=0.05)
+    assert not found.heave()[[0, 2]].any()
