@@ -29,10 +29,10 @@ TASK: Final = Task(
             ),
         ),
     ),
-    seeds=Seeds(train=223_000_001, validation=223_000_002, test=223_000_003),
+    seeds=Seeds(train=223_000_001, validation=223_000_002, test=223_000_004),
     digests={
         "train": "84b72cdf6dc3b07eb9054e4204b7aa8a88f4d2231fcd09821e742d2e835dabe7",
         "validation": "ed1bda9d29a82f47dc1f43f2cae5885946427ffbb9907e4c2c5cb7ace5f88c16",
-        "test": "4c8f8e72d574544c3b4db079ac26af34788d06250fea1cf6c25e9804f55d6c11",
+        "test": "374c68b56ab0e68ff2c28a2793b8c1c49b07437bca036611721d745c59dd75cf",
     },
 )
