@@ -174,6 +174,8 @@ class WaveFilter:
         self.probability = np.full((rows, kinds), 1.0 / kinds)
         """(N, M) of each kind of sea, by the readings so far."""
         self._step, self._heard = np.zeros((2, rows), dtype=np.int64)
+        self.missed = np.zeros(rows)
+        """(N,) what the latest reading of the depth was above what had been foretold, m."""
 
     def start(self, rows: Rows = ALL) -> None:
         """Begin in these rows with a ship at rest."""
@@ -184,6 +186,7 @@ class WaveFilter:
         self.probability[rows] = 1.0 / self.probability.shape[1]
         self._step[rows] = 0
         self._heard[rows] = 0
+        self.missed[rows] = 0.0
 
     def find(self, heave_rate: FloatArray, depth: FloatArray, rows: Rows = ALL) -> None:
         """Take the readings (n,) of heave rate [m/s] and heave by the depth [m] at the start of these rows."""
@@ -216,6 +219,7 @@ class WaveFilter:
 
     def correct(self, innovation: FloatArray) -> None:
         """Take the innovation (N,) m of the depth; it counts in the steps that have a reading."""
+        self.missed = np.where(self._step % self._schedule.hold == 0, innovation, self.missed)
         _kernels().correct(
             self._of_kinds,
             1.0 / self._exponent,

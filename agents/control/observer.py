@@ -38,6 +38,8 @@ class KalmanObserver:
         """(steps of delay, N) turns of the drums since the moment of measurement, rad."""
         bank = WaveBank.of(waves, sensors)
         self._tension, self._unit = sensors.tension, sensors.motion_unit
+        self.heard = np.ones(rows, dtype=np.bool_)
+        """(N,) whether the latest reading of the heave rate was one: in a dropout the last one stays, to the bit."""
         self.waves = WaveFilter(rows, hoists.period, hold, bank)
         self.load = RopeFilter(rows, bank.rate_noise)
         self.lateness = Lateness(rows, hoists.period, len(self._turns)) if adapts else None
@@ -49,6 +51,7 @@ class KalmanObserver:
         if self.lateness is not None:
             self.lateness.start(rows)
         self._turns[:, rows] = 0.0
+        self.heard[rows] = True
         self._start(o, rows)
 
     def retune(self, longer: FloatArray) -> None:
@@ -123,8 +126,8 @@ class KalmanObserver:
             self.waves.advance(heave_rate)
             true_rate = heave_rate
         else:
-            # In a dropout the last reading stays, to the bit.
-            self.waves.advance(heave_rate, heave_rate != self._heave_rate)
+            self.heard = heave_rate != self._heave_rate
+            self.waves.advance(heave_rate, self.heard)
             true_rate = self.waves.rate(np.zeros(1))[0]
         speed = 0.5 * (true_rate + self._true_rate) - paid_out / self._hoists.period
         self._heave_rate, self._true_rate, self._drum_angle = heave_rate, true_rate, drum_angle

@@ -77,7 +77,13 @@ class LookoutConfig:
         """Quantities beside the forecasts, each by its unit's scale: what is read, and what a radar foretells."""
         foretold = quantities(self.sensors)[len(SENSED) :] if self.sensors else ()
         read = tuple(_SENSED_SCALES if self.sensors else _STATE_SCALES)
-        return (*read, *("lateness",) * self.adapts, *(quantity.name for quantity in foretold))
+        of_unit = ("heard", "missed_depth") if self.has_motion_unit else ()
+        return (*read, *("lateness",) * self.adapts, *of_unit, *(quantity.name for quantity in foretold))
+
+    @property
+    def has_motion_unit(self) -> bool:
+        """Whether a motion reference unit with errors of its own tells the heave: then the depth is looked at, too."""
+        return self.sensors is not None and self.sensors.motion_unit is not None
 
 
 _SENSED_SCALES: Final = {"pulley_velocity_z": 1.0, "pulley_heave": 0.5, "roll": 10.0, "pitch": 10.0}
@@ -85,6 +91,7 @@ _STATE_SCALES: Final = {"pulley_velocity_z": 1.0, "pulley_heave": 0.5, "pulley_a
 _PREVIEW_SCALE: Final = 0.5
 _SURPRISE_SCALE: Final = 10.0
 _LATENESS_SCALE: Final = 5.0
+_DEPTH_SCALE: Final = 2.0
 
 
 def _is_late(source: ScenarioSource) -> bool:
@@ -114,6 +121,7 @@ class Lookout:
         self._observer = observer_for(self._hoists, DAMPING_RATIO, config.sensors, config.waves, config.adapts)
         self._previewed = PreviewedPath.of(config.sensors, rows, config.control_period)
         self._scales = _SENSED_SCALES if config.sensors else _STATE_SCALES
+        self._has_motion_unit = config.has_motion_unit
         self._period = config.control_period
         # The bank's time is that of the latest reading's moment of measurement.
         delay = config.delay * self._period
@@ -212,6 +220,7 @@ class Lookout:
             *(path[1:] - path[0]),
             *(scale * o[name] for name, scale in self._scales.items()),
             *(() if lateness is None else (_LATENESS_SCALE * lateness.seconds,)),
+            *self._of_unit(),
             *(_PREVIEW_SCALE * foretold),
             _SURPRISE_SCALE * surprise,
         )
@@ -220,3 +229,10 @@ class Lookout:
         if (winch.lag > 0.0).any():
             rise = np.where(winch.lag > 0.0, waves.rate(ends_at)[0], rise)
         return Outlook(np.stack(series, axis=1).astype(np.float32), z, rise, winch.radius * winch.speed)
+
+    def _of_unit(self) -> tuple[FloatArray, ...]:
+        """What is seen of a motion reference unit: whether it is heard, and what the depth says against it."""
+        if not self._has_motion_unit:
+            return ()
+        assert isinstance(self._observer, KalmanObserver)
+        return self._observer.heard.astype(np.float64), _DEPTH_SCALE * self._observer.waves.missed

@@ -36,9 +36,6 @@ OPTIMUM_ROUNDS: Final = 8
 """Gauss-Newton steps of the optimum: what further ones gain is of no account here."""
 LEAST_CEILING: Final = 0.3
 """Heave reduction of the optimum below which an episode is left out: nothing is to be learned from it."""
-GREATEST_ERROR: Final = 0.6
-"""Error of an estimate, m or m/s, beyond which an episode is: its rope went slack."""
-
 GREATEST_DELAY: Final = 0.6
 """Greatest delay of readings that is followed, s."""
 
@@ -72,6 +69,8 @@ class Recordings:
     """(N, 3, 4), ``reading`` (N, H) and ``softness`` (N,): of ``Estimates``."""
     reading: Array
     softness: Array
+    start: Array
+    """(N, 3) depth error, its rate and the rope's end at the start, m and m/s: on a ship that moves already none is 0."""
     rise: Array
     """(N, n) foretold speed of the pulley in the coming step, as in ``Outlook``, m/s."""
     path: Array
@@ -150,6 +149,7 @@ def required_path(scenarios: Sequence[Scenario], period: float, steps: int) -> t
         rope.advance()
     rate = np.zeros((steps + 1, len(scenarios)))
     rate[1:] = (half[3::2] - half[1:-1:2]) / period
+    rate[0] = (4.0 * half[1] - 3.0 * half[0] - half[2]) / period
     return half[::2].T.copy(), rate.T.copy()
 
 
@@ -179,6 +179,7 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
     noise = np.random.default_rng(seed).integers(2**63, size=count).tolist()
     simulation.reset_rows(np.arange(count), list(zip(scenarios, noise, strict=True)))
     radius = np.array([scenario.crane.winch.drum_radius for scenario in scenarios])
+    taut, start = np.ones(count, dtype=np.bool_), np.zeros((count, 3))
     series, error, rise = [], np.empty((count, steps, 4)), np.empty((count, steps))
     gain = np.zeros((count, steps if adapts else 0, 4))
     reading, softness = readings(scenarios, config), told_softness(scenarios)
@@ -191,6 +192,7 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
         rope_end = path[:, step] - radius * true[:, task.DRUM_ANGLE]
         rope_end_speed = path_speed[:, step] - outlook.speed
         state = np.stack([true[:, task.DEPTH_ERROR], true[:, task.LOAD_VELOCITY_Z], rope_end], axis=1)
+        start = start if step else state
         if estimates is not None:
             gain[:, step] = lookout.load_gain
             state = estimates.advance(*map(torch.from_numpy, (state, path[:, step] - paid_out, gain[:, step]))).numpy()
@@ -201,6 +203,7 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
         error[:, step] = outlook.z - np.column_stack([state, rope_end_speed])
         rise[:, step] = outlook.rise
         simulation.advance(lookout.follow(optimum.commands[:, step]))
+        taut &= simulation.results[:, task.SLACK] == 0.0
         paid_out = paid_out + radius * lookout.turned
     best = np.sqrt(optimum.omega1 / config.duration)
     winches = [scenario.crane.winch for scenario in scenarios]
@@ -217,6 +220,7 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
         told_transition=lookout.told_transition,
         reading=reading,
         softness=softness,
+        start=start.astype(np.float32),
         rise=rise.astype(np.float32),
         path=path,
         path_speed=path_speed.astype(np.float32),
@@ -230,6 +234,5 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
         still=still.rms,
         best=best,
     )
-    of_use = np.isfinite(best) & (best < (1.0 - LEAST_CEILING) * still.rms)
-    of_use &= abs(error).max(axis=(1, 2)) < GREATEST_ERROR
+    of_use = taut & np.isfinite(best) & (best < (1.0 - LEAST_CEILING) * still.rms)
     return recordings.rows(np.flatnonzero(of_use))

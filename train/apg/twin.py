@@ -66,6 +66,8 @@ class Twin:
     """(B,) what a command is ahead of the reckoned speed for a share of 1, m/s, as told."""
     told_speed: torch.Tensor
     """(B,) greatest speed of the rope at the drum, as told, m/s."""
+    first: torch.Tensor
+    """(B, 3) state at the start."""
     period: float
     """Control step, s."""
 
@@ -77,11 +79,11 @@ class Twin:
         alike = recordings.made_for.sensors is None or all(torch.equal(true, told) for true, told in pairs)
         winches = Winches(*(torch.stack((true,) if alike else (true, told)) for true, told in pairs))
         reach = (1.0 + r["told_lag"]) * r["told_change"]
-        return cls(r["transition"], winches, reach, r["told_speed"], recordings.period)
+        return cls(r["transition"], winches, reach, r["told_speed"], r["start"], recordings.period)
 
     def start(self) -> tuple[torch.Tensor, torch.Tensor]:
-        """State (B, 3) and speeds (D, B) of lifts that hang at rest."""
-        return self.transition.new_zeros(self.transition.shape[:2]), torch.zeros_like(self.winches.lag)
+        """State (B, 3) of the lifts at the start, and speeds (D, B) of their drums, which stand still."""
+        return self.first, torch.zeros_like(self.winches.lag)
 
     def advance(
         self, state: torch.Tensor, speed: torch.Tensor, share: torch.Tensor, rise: torch.Tensor
