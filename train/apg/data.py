@@ -70,7 +70,7 @@ class Recordings:
     reading: Array
     softness: Array
     start: Array
-    """(N, 3) depth error, its rate and the rope's end at the start, m and m/s: on a ship that moves already none is 0."""
+    """(N, 3) depth error, its rate and the rope's end at the start, m and m/s: of a ship that moves already, too."""
     rise: Array
     """(N, n) foretold speed of the pulley in the coming step, as in ``Outlook``, m/s."""
     path: Array

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 import torch
 
-from aframe_env import Crane, InvalidValue, ScenarioDistribution, TaskConfig, Winch, task
+from aframe_env import Crane, InvalidValue, MotionUnit, ScenarioDistribution, TaskConfig, Winch, task
 from aframe_env.scenario.sensors import Sensors
+from aframe_env.scenario.series import drawn_scenarios
 from aframe_env.simulation import Simulation
 from aframe_env.suite import find_task
 from agents import cards
@@ -277,3 +278,34 @@ def test_other_ropes_retune_it():
     assert lookout.gains == pytest.approx(longer.gains)
     assert lookout.figures == pytest.approx(longer.figures, abs=1e-6)
     assert abs(lookout.gains - before).max() > 1e-3
+
+
+def seen_of_the_unit(unit):
+    """Whether the unit is heard, and what the depth says against it, in 20 s with the drum still, (200, 6) each."""
+    mru = find_task("MRU")
+    sensors = replace(mru.distribution.sensors, motion_unit=unit)
+    config = TaskConfig(scenario=replace(mru.distribution, sensors=sensors, sensor_delay=None), observation="sensors")
+    scenarios = drawn_scenarios(config.source, 3, 6)
+    simulation = Simulation(6, config)
+    simulation.reset_rows(np.arange(6), [(scenario, i) for i, scenario in enumerate(scenarios)])
+    made_for = LookoutConfig.of(config)
+    lookout, at = Lookout(6, made_for), FORECASTS + made_for.readings.index("heard")
+    lookout.start(simulation.observe(), scenarios)
+    series, rates = [], [simulation.observe()[:, 0]]
+    for _ in range(200):
+        simulation.advance(lookout.follow(np.zeros(6)))
+        series.append(lookout.advance(simulation.observe()).series[:, at : at + 2])
+        rates.append(simulation.observe()[:, 0])
+    heard, missed = np.moveaxis(series, 2, 0)
+    assert np.array_equal(heard == 1.0, np.diff(rates, axis=0) != 0.0)
+    return heard, missed
+
+
+def test_it_sees_dropouts_and_what_the_depth_says_against_the_unit():
+    whole = MotionUnit(heave_period=20.0, heave_damping=0.707)
+    heard, missed = seen_of_the_unit(whole)
+    assert heard.all()
+    heard, _ = seen_of_the_unit(replace(whole, dropouts=6.0, dropout_time=2.0))
+    assert 0.05 < 1.0 - heard.mean() < 0.4
+    _, misled = seen_of_the_unit(replace(whole, lever_arm_error=10.0))
+    assert np.sqrt(np.mean(misled**2)) > 1.5 * np.sqrt(np.mean(missed**2))

@@ -156,7 +156,7 @@ def test_gradients_are_those_of_finite_differences():
 def test_at_the_winchs_limits_the_gradient_leads_back():
     one = torch.ones(1).double()
     winches = Winches(0.2 * one[None], 2.0 * one[None], 0.0 * one[None])
-    twin = Twin(torch.eye(3, 4).double()[None], winches, 0.2 * one, 2.0 * one, 0.1)
+    twin = Twin(torch.eye(3, 4).double()[None], winches, 0.2 * one, 2.0 * one, torch.zeros(1, 3).double(), 0.1)
     for start, share, pull in ((0.0, 1.7, 1.0), (0.0, -1.7, -1.0), (1.95, 0.9, 1.0)):
         asked = torch.tensor([share]).double().requires_grad_()
         for sign, seen in ((pull, True), (-pull, False)):
