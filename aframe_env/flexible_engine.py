@@ -125,10 +125,6 @@ class FlexibleEngine(Engine):
         """Slots of a row at the start of a scenario, the frame's first: (frame slots + slots,)."""
         if scenario.luffing is not None:
             scenario.luffing.require_rigid_servomotors(scenario.crane.frame)
-        if scenario.crane.winch.drive is not None:
-            raise InvalidValue(
-                f'drive = {shown(scenario.crane.winch.drive)}: model = "rfem" has no drum with inertia: must be None'
-            )
         row = super().row_vector(scenario)
         frame = np.zeros(self._slots)
         frame[flex.FRAME] = self._line(scenario)

@@ -25,6 +25,7 @@ from aframe_env.dynamics import layout as at
 from aframe_env.dynamics.compiling import fma, larger, scalar, smaller
 from aframe_env.dynamics.layout import Span
 from aframe_env.dynamics.lift import (
+    END_OVER,
     FILTERED,
     INTEGRAL,
     LENGTH,
@@ -72,26 +73,35 @@ def exchange_drum(row: Array, span: Span) -> None:
 
 
 @scalar
+def want(row: Array, start: float, middle: float, end: float, lanes: int, j: int) -> None:
+    """Have lane j's drum, if it has a drive, pay out at these speeds over the inner step, m/s."""
+    if row[at.DRIVE * lanes + j] > 0.0:
+        inverse = 1.0 / row[at.DRUM_RADIUS * lanes + j]
+        row[at.WANTED * lanes + j] = inverse * start
+        row[(at.WANTED + 1) * lanes + j] = inverse * middle
+        row[(at.WANTED + 2) * lanes + j] = inverse * end
+
+
+@scalar
 def take_wanted(row: Array, span: Span) -> None:
     """Take the wanted speeds at start, middle and end of the inner step from ENDS."""
     lanes = span.stride
     for j in range(span.begin, span.end):
-        if row[at.DRIVE * lanes + j] > 0.0:
-            inverse = 1.0 / row[at.DRUM_RADIUS * lanes + j]
-            for k in range(3):
-                paid_out = row[(at.ENDS + k * at.END_SIZE + PAY_OUT) * lanes + j]
-                row[(at.WANTED + k) * lanes + j] = inverse * paid_out
+        slot = at.ENDS + PAY_OUT
+        start, middle = row[slot * lanes + j], row[(slot + at.END_SIZE) * lanes + j]
+        want(row, start, middle, row[(slot + 2 * at.END_SIZE) * lanes + j], lanes, j)
 
 
 @scalar
 def place_drum(row: Array, source: int, end: int, span: Span) -> None:
-    """Write to ENDS the rope that the drum has out in a stage, and how fast it pays out."""
+    """Write to ENDS the rope that is out in a stage, the drum's and what a flexible frame hands over, and its rate."""
     lanes = span.stride
     for j in range(span.begin, span.end):
         if row[at.DRIVE * lanes + j] > 0.0:
             radius, angle = row[at.DRUM_RADIUS * lanes + j], row[(source + TURN) * lanes + j]
-            row[(end + LENGTH) * lanes + j] = fma(radius, angle, row[at.FREE_LENGTH * lanes + j])
-            row[(end + PAY_OUT) * lanes + j] = radius * row[(source + TURN_RATE) * lanes + j]
+            over, over_rate = row[(end + END_OVER) * lanes + j], row[(end + END_OVER + 1) * lanes + j]
+            row[(end + LENGTH) * lanes + j] = fma(radius, angle, row[at.FREE_LENGTH * lanes + j]) + over
+            row[(end + PAY_OUT) * lanes + j] = radius * row[(source + TURN_RATE) * lanes + j] + over_rate
 
 
 @scalar
@@ -172,12 +182,12 @@ def settle_drum(row: Array, span: Span) -> None:
 
 
 @scalar
-def hold_load(row: Array, span: Span) -> None:
-    """Have drives hold what hangs on their drums at the start, where a stage has just been measured."""
+def hold_load(row: Array, end: int, span: Span) -> None:
+    """Have drives hold what hangs on their drums at the start, a stage with ``end`` having just been measured."""
     lanes = span.stride
     for j in range(span.begin, span.end):
         if row[at.DRIVE * lanes + j] > 0.0:
-            pull = pull_of_rope(row, at.LIFT, at.ENDS, lanes, j)
+            pull = pull_of_rope(row, at.LIFT, end, lanes, j)
             tension, share = row[at.TENSION * lanes + j], row[at.FEEDFORWARD * lanes + j]
             held = within(row, -pull / row[at.GEAR * lanes + j], 0.0, lanes, j)
             row[at.FILTERED * lanes + j] = tension

@@ -274,10 +274,11 @@ LIFT_B: Final = _take(LIFT_SIZE)
 """The same at the stage after."""
 LIFT_SUM: Final = _take(LIFT_SIZE)
 """Weighted sum of the stages' rates."""
-END_SIZE: Final = 14
+END_SIZE: Final = 16
 ENDS: Final = _take(3 * END_SIZE)
 """Upper end of the rope at the start, middle and end of the inner step: the pulley's position, velocity and
-acceleration, unstretched length between drum and load, its rate, the target's level, and \\|SH\\| with its rate."""
+acceleration, unstretched length between drum and load, its rate, the target's level, \\|SH\\| with its rate, and the
+rope that goes over the pulley as a flexible frame comes nearer to the drum, part of the length, with its rate."""
 FLOW: Final = _take(3)
 """Velocity of the water about the load at the start of a segment, m/s."""
 FLOW_RATE: Final = _take(3)

@@ -34,6 +34,7 @@ LENGTH: Final = 9
 PAY_OUT: Final = 10
 END_TARGET: Final = 11
 END_REACH: Final = 12
+END_OVER: Final = 14
 
 # Places in STAGE: what is summed up over an inner step, and what the full model asks of a stage.
 (

@@ -71,7 +71,7 @@ def start_any(row: Array, span: Span) -> None:
     """Meet the water, and measure tension and slackness of lanes with ropes of either kind, at the start."""
     begin_water_at_node(row, span)
     measure_any(row, span)
-    hold_load(row, span)
+    hold_load(row, at.ENDS, span)
 
 
 @scalar

@@ -385,7 +385,6 @@ def test_information_tells_torque_and_power() -> None:
         (lambda: Winch(drive=3.0), "drive = 3.0"),  # type: ignore[arg-type]
         (lambda: Winch(drive=TorqueDrive(), max_power=1e6), "max_power = 1000000.0 W"),
         (lambda: lift(TorqueDrive(inertia=1.0)), "seabed, compensator, drive"),
-        (lambda: AFrameHeaveEnv(scenario=lift(TorqueDrive()), model="rfem").reset(), "drive = TorqueDrive"),
     ],
 )
 def test_says_what_does_not_go_together(make: Callable[[], object], message: str) -> None:

@@ -15,7 +15,7 @@ from aframe_env.env import AFrameHeaveEnv
 from aframe_env.flexible_engine import Mesh
 from aframe_env.rfem.model import frame_model
 from aframe_env.rfem.simulate import DynamicCase, simulate
-from aframe_env.scenario import Luffing, Scenario
+from aframe_env.scenario import Luffing, Scenario, TorqueDrive
 from aframe_env.scenario.crane import Crane, Winch
 from aframe_env.scenario.cross_sections import FrameStructure, Material, Servomotor
 from aframe_env.validation import InvalidValue
@@ -48,11 +48,11 @@ def test_frame_that_holds_is_that_of_a_scenario_without_luffing():
             assert here == pytest.approx(there, rel=1e-9, abs=1e-9 * np.abs(there).max())
 
 
-@pytest.mark.parametrize("mass_per_length", [0.0, 20.0])
-def test_stiff_frame_is_the_simplified_model(mass_per_length):
+@pytest.mark.parametrize(("mass_per_length", "drive"), [(0.0, None), (20.0, None), (20.0, TorqueDrive())])
+def test_stiff_frame_is_the_simplified_model(mass_per_length, drive):
     scenario = swinging(Material(young_modulus=2.1e14, shear_modulus=8.1e13), motion=rough_sea())
-    crane = replace(scenario.crane, rope=replace(scenario.crane.rope, mass_per_length=mass_per_length))
-    scenario = replace(scenario, crane=crane)
+    rope = replace(scenario.crane.rope, mass_per_length=mass_per_length)
+    scenario = replace(scenario, crane=replace(scenario.crane, rope=rope, winch=Winch(drive=drive)))
     engine = Engine(1, PERIOD)
     engine.reset_row(0, scenario)
     rigid = []

@@ -23,6 +23,7 @@ from aframe_env import (
     Seabed,
     SeaMotion,
     TargetPath,
+    TorqueDrive,
     Water,
     Winch,
 )
@@ -111,6 +112,7 @@ BEYOND = {
         "target_path": TargetPath.lowering(-3.0, 0.3, start=2.0),
     },
     "compensator": {"crane": replace(crane(), compensator=Compensator())},
+    "drive": {"crane": replace(crane(), winch=Winch(drive=TorqueDrive()))},
     "splash": {"load": replace(LOADS["template"].shape, exit_area=100.0), "target_level": 0.0},
     "seabed": {
         "load": replace(WET["load"], height=3.0),
@@ -130,7 +132,7 @@ def test_a_stiff_frame_is_the_simplified_model_s_in_all_else(name: str) -> None:
     error, extent = np.abs(stiff - rigid).max(axis=0), np.ptp(rigid, axis=0)
     # Surface and ground meet the load within an inner step, which is another one in the full model; and the power that
     # is left goes by the tension at the start of a step.
-    assert error[:3].max() < {"compensator": 1e-4, "winch": 5e-4, "splash": 5e-3, "seabed": 1e-3}[name]
+    assert error[:3].max() < {"compensator": 1e-4, "drive": 1e-4, "winch": 5e-4, "splash": 5e-3, "seabed": 1e-3}[name]
     assert (error[3:] < 5e-3 * extent[3]).all()
     slots = (at.TARGET, at.LANDINGS, at.LIFT_OFFS, at.DRUM_RADIUS)
     assert [engines[0].read(slot)[0] for slot in slots] == [engines[1].read(slot)[0] for slot in slots]
@@ -233,6 +235,7 @@ def test_rows_side_by_side_are_rows_alone() -> None:
         at_sea(2900.0, 3e5, water=None, load=LoadShape()),
         at_sea(700.0, 4e3, initial="rest"),
         Scenario.paper(),
+        at_sea(120.0, 4e4, **BEYOND["drive"]),
         Scenario.paper("rest", 2e4, motion=SeaMotion(sea=Sea(hs=4.0, tp=8.0, seed=2))),
     ]
     commands = np.random.default_rng(1).uniform(-3.0, 3.0, (30, len(scenarios)))

@@ -80,6 +80,7 @@ CHECKS: Sequence[Callable[[], Check | list[Check]]] = (
     run_checks.shocks,
     luffing_checks.swings,
     luffing_checks.rigid_swing,
+    drive_checks.torque_drive_on_flexible_frame,
     run_checks.stiff_frame,
     run_checks.energy,
     run_checks.steps,

@@ -11,7 +11,7 @@ sideways. The Coriolis force on the lumps, some 1e-4 of the tension, acts on the
 
 Rope that goes over S as the deflected head comes nearer to the drum is written to ENDS as if the drum had paid it out;
 ENDS have the distance from drum to pulley at rest, and what luffing adds to it. The end of a step in ENDS is where the
-next one starts.
+next one starts. A drum with inertia turns within the Runge-Kutta step, in each pass anew.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from aframe_env.dynamics import layout as at
 from aframe_env.dynamics import start
 from aframe_env.dynamics.blocks import nine, put_three, three
 from aframe_env.dynamics.compiling import larger, scalar, select
+from aframe_env.dynamics.drive import exchange_drum, hold_load, settle_drum, want
 from aframe_env.dynamics.flexible import layout as flex
 from aframe_env.dynamics.flexible.deck import deck_now
 from aframe_env.dynamics.flexible.rope import apply, apply_transposed, unit
@@ -38,15 +39,14 @@ from aframe_env.dynamics.lift import (
     COST,
     ELEMENT,
     END_ACCELERATION,
+    END_OVER,
     END_REACH,
     END_TARGET,
     END_VELOCITY,
-    LENGTH,
     LEVER,
     LOAD_SHARE,
     MASS_LEVER,
     MASS_LEVER_SQUARED,
-    PAY_OUT,
     SLACKEST,
     SLIDE,
     SPEED,
@@ -96,8 +96,16 @@ def put_head(row: Array, frame: Array, shift: Vector, rate: Vector, drum: RopeOu
         reach += frame[flex.REACHED * lanes + j]
         reach_rate = frame[(flex.REACHED + 1) * lanes + j]
         over_rate += reach_rate - inner(to_drum, three(frame, flex.DRUM_RATE, lanes, j))
-    end = RopeEnd(place, velocity, drum.length + (reach - inboard), drum.speed + over_rate, 0.0)
-    put_end(row, END, lanes, j, end, acceleration, (reach, reach_rate))
+    length, speed = drum.length + (reach - inboard), drum.speed + over_rate
+    put_end(row, END, lanes, j, RopeEnd(place, velocity, length, speed, 0.0), acceleration, (reach, reach_rate))
+    put_over(row, END, length - drum.length, speed - drum.speed, lanes, j)
+
+
+@scalar
+def put_over(row: Array, slot: int, length: float, rate: float, lanes: int, j: int) -> None:
+    """Write to ENDS the rope that goes over S as the head comes nearer to the drum, m, and its rate, m/s."""
+    row[(slot + END_OVER) * lanes + j] = length
+    row[(slot + END_OVER + 1) * lanes + j] = rate
 
 
 @scalar
@@ -110,21 +118,22 @@ def halfway(before: float, rate: float, after: float, rate_after: float, h: floa
 
 
 @scalar
-def put_middle(row: Array, drum: tuple[RopeOut, RopeOut, RopeOut], h: float, lanes: int, j: int) -> None:
-    """Write MIDDLE between START and END; ``drum``: what the drum has out at the three times."""
+def put_middle(row: Array, drum: RopeOut, h: float, lanes: int, j: int) -> None:
+    """Write MIDDLE between START and END; ``drum``: what the drum has out."""
     position, velocity = three(row, START, lanes, j), three(row, START + END_VELOCITY, lanes, j)
     position_after, velocity_after = three(row, END, lanes, j), three(row, END + END_VELOCITY, lanes, j)
     x, u = halfway(position.x, velocity.x, position_after.x, velocity_after.x, h)
     y, v = halfway(position.y, velocity.y, position_after.y, velocity_after.y, h)
     z, w = halfway(position.z, velocity.z, position_after.z, velocity_after.z, h)
     over, over_rate = halfway(
-        row[(START + LENGTH) * lanes + j] - drum[0].length,
-        row[(START + PAY_OUT) * lanes + j] - drum[0].speed,
-        row[(END + LENGTH) * lanes + j] - drum[2].length,
-        row[(END + PAY_OUT) * lanes + j] - drum[2].speed,
+        row[(START + END_OVER) * lanes + j],
+        row[(START + END_OVER + 1) * lanes + j],
+        row[(END + END_OVER) * lanes + j],
+        row[(END + END_OVER + 1) * lanes + j],
         h,
     )
-    middle = RopeEnd(Vector(x, y, z), Vector(u, v, w), drum[1].length + over, drum[1].speed + over_rate, 0.0)
+    put_over(row, MIDDLE, over, over_rate, lanes, j)
+    middle = RopeEnd(Vector(x, y, z), Vector(u, v, w), drum.length + over, drum.speed + over_rate, 0.0)
     both = add(three(row, START + END_ACCELERATION, lanes, j), three(row, END + END_ACCELERATION, lanes, j))
     reach = row[at.DRUM_TO_PULLEY * lanes + j], 0.0
     if row[at.LUFFING_POINTS * lanes + j] > 0.0:
@@ -208,7 +217,10 @@ def step_heavy_rope(row: Array, frame: Array, table: Array, index: int, span: Sp
     give, give_rate = nine(table, flex.GIVE + 18, 1, 0), nine(table, flex.GIVE_RATE + 18, 1, 0)
     for k in range(at.END_SIZE):
         row[(START + k) * lanes + j] = row[(END + k) * lanes + j]
-    drum = turn_drum(row, index, h, lanes, j)
+    # Where a drum has inertia, only ``want`` is told of the one that goes as it is told: stages place the real one.
+    exchange_drum(row, span)
+    middle, end = turn_drum(row, index, h, lanes, j)
+    exchange_drum(row, span)
     for k in range(at.LIFT_SIZE):
         frame[(flex.HELD + k) * lanes + j] = row[(at.LIFT + k) * lanes + j]
     row[at.STEP_LENGTH * lanes + j] = h
@@ -219,10 +231,11 @@ def step_heavy_rope(row: Array, frame: Array, table: Array, index: int, span: Sp
         for k in range(at.LIFT_SIZE):
             row[(at.LIFT + k) * lanes + j] = frame[(flex.HELD + k) * lanes + j]
         shift = add(tip, apply(give, force))
-        put_head(row, frame, shift, add(tip_rate, apply(give_rate, force)), drum[2], lanes, j)
-        put_middle(row, drum, h, lanes, j)
+        put_head(row, frame, shift, add(tip_rate, apply(give_rate, force)), end, lanes, j)
+        put_middle(row, middle, h, lanes, j)
         move_target(row, span)
         lift_step(row, springs, False, span)
+        settle_drum(row, span)
         stage(row, at.LIFT, at.LIFT_A, END, 0.5, 0.0, springs, span)
         force = head_force(row, frame, table, shift, force, lanes, j)
     # The lumps stay where they are while S gives way to the last pass's force.
@@ -231,7 +244,7 @@ def step_heavy_rope(row: Array, frame: Array, table: Array, index: int, span: Sp
     down = inner(axis, apply(nine(frame, flex.ROTATION, lanes, j), given))
     for i in range(1, springs):
         row[(at.LIFT + i) * lanes + j] -= down
-    put_head(row, frame, add(shift, given), add(tip_rate, apply(give_rate, force)), drum[2], lanes, j)
+    put_head(row, frame, add(shift, given), add(tip_rate, apply(give_rate, force)), end, lanes, j)
     put_three(frame, flex.PULL, lanes, j, force)
     move_target(row, span)
     row[at.TARGET * lanes + j] = row[(END + END_TARGET) * lanes + j]
@@ -242,8 +255,8 @@ def step_heavy_rope(row: Array, frame: Array, table: Array, index: int, span: Sp
 
 
 @scalar
-def turn_drum(row: Array, index: int, h: float, lanes: int, j: int) -> tuple[RopeOut, RopeOut, RopeOut]:
-    """Turn the drum over inner step ``index``: rope that it has out at its start, middle and end."""
+def turn_drum(row: Array, index: int, h: float, lanes: int, j: int) -> tuple[RopeOut, RopeOut]:
+    """Turn the drum over inner step ``index``: rope that it has out in its middle and at its end."""
     first, decay = row[(at.WINCH + 3) * lanes + j], row[at.HALF_STEP_DECAY * lanes + j]
     radius, free = row[at.DRUM_RADIUS * lanes + j], row[at.FREE_LENGTH * lanes + j]
     angle0, speed0 = row[at.DRUM_ANGLE * lanes + j], row[at.DRUM_SPEED * lanes + j]
@@ -254,11 +267,10 @@ def turn_drum(row: Array, index: int, h: float, lanes: int, j: int) -> tuple[Rop
     row[(at.WINCH + 4) * lanes + j] = error2
     row[at.DRUM_ANGLE * lanes + j] = angle2
     row[at.DRUM_SPEED * lanes + j] = speed2
-    return (
-        RopeOut(free + radius * angle0, radius * speed0),
-        RopeOut(free + radius * angle1, radius * middle_speed(angle0, speed0, angle2, speed2, h)),
-        RopeOut(free + radius * angle2, radius * speed2),
-    )
+    middle = RopeOut(free + radius * angle1, radius * middle_speed(angle0, speed0, angle2, speed2, h))
+    end = RopeOut(free + radius * angle2, radius * speed2)
+    want(row, radius * speed0, middle.speed, end.speed, lanes, j)
+    return middle, end
 
 
 @scalar
@@ -270,6 +282,7 @@ def start_heavy_rows(row: Array, frame: Array, tables: Array, comoving: float, l
         deflection = rest_heavy(row, frame, table, lanes, j)
         hang(row, frame, deflection, comoving, lanes, j)
         measure(row, frame, deflection, Span(lanes, j, j + 1))
+        hold_load(row, END, Span(lanes, j, j + 1))
         release(frame, table, lanes, j)
 
 
