@@ -46,7 +46,8 @@ def energy_balance(result: DynamicResult) -> EnergyBalance:
     displacements add. The tension of a servomotor keeps its undeformed direction.
 
     Raises:
-        InvalidValue: The output interval is longer than the step.
+        InvalidValue: The output interval is longer than the step; or the frame luffs with a geometric stiffness, which
+            changes from angle to angle by nobody's work.
     """
     case, history = result.case, result.frame
     scenario, crane = case.scenario, case.scenario.crane
@@ -54,6 +55,8 @@ def energy_balance(result: DynamicResult) -> EnergyBalance:
         raise InvalidValue(
             f"output_interval = {case.output_interval} s: must be the step, {case.step} s, for a balance"
         )
+    if case.second_order and scenario.luffing is not None:
+        raise InvalidValue("second_order = True: must be False for a balance with luffing")
     model, deck = history.model, result.deck
     luffed = history.luffed
     axes = axes_states(deck, model, luffed)

@@ -86,10 +86,7 @@ def grid_angles(luffing: Luffing) -> list[float]:
 
 
 def model_at(model: FrameModel, angle: float) -> FrameModel:
-    """The model of the same frame at another luffing angle, rad."""
+    """The model of the same frame at another luffing angle, rad, without geometric stiffness."""
     frame = replace(model.frame, luffing_angle=angle)
-    result = replace(model, frame=frame, constraints=constrain(frame, model.structure, model.mass))
-    # What does not turn with the servomotors, rigid as they are.
-    for name in ("slices", "mass", "deformation", "stiffness", "damping"):
-        result.__dict__[name] = getattr(model, name)
-    return result
+    # Rigid servomotors turn, and nothing that the copy takes over turns with them.
+    return model.changed(frame=frame, constraints=constrain(frame, model.structure, model.mass), geometric=None)

@@ -9,9 +9,9 @@ e_F = E_0 w + E_1 W + E(W) q + E(2 Ω×) q̇ (:mod:`aframe_env.rfem.slices`).
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import scipy
@@ -57,6 +57,13 @@ class FrameModel:
     geometric: scipy.sparse.csr_array | None = None
     """Geometric stiffness K_G, (n, n), of the state about which it is linear, see
     :mod:`aframe_env.rfem.second_order`; None: of the undeformed and unloaded frame."""
+
+    def changed(self, **changes: Any) -> FrameModel:
+        """A copy with some fields changed that leave mass and damping as they are; these it takes over."""
+        result = replace(self, **changes)
+        for name in ("slices", "mass", "deformation", "damping"):
+            result.__dict__[name] = getattr(self, name)
+        return result
 
     @cached_property
     def slices(self) -> Slices:

@@ -9,7 +9,7 @@ servomotors that turn with them hold them back.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -149,4 +149,4 @@ def _arm_stiffness(force: Array, arm: Array) -> Array:
 
 def stiffened(model: FrameModel, geometric: sp.csr_array) -> FrameModel:
     """The model with that geometric stiffness."""
-    return replace(model, geometric=geometric)
+    return model.changed(geometric=geometric)

@@ -23,8 +23,8 @@ from aframe_env.rfem.luffed import angle_nodes, luffed_frame, model_at
 from aframe_env.rfem.model import FrameModel, frame_model
 from aframe_env.rfem.rope_law import RopeForce, rope_force
 from aframe_env.rfem.servomotor_stroke import Stroke, strokes_at
-from aframe_env.rfem.stage import Stage, TurningServomotors
-from aframe_env.rfem.statics import LoadCase, solve, static
+from aframe_env.rfem.stage import Stage
+from aframe_env.rfem.statics import at_rest, solve
 from aframe_env.scenario import Scenario
 from aframe_env.validation import InvalidValue, require_number
 
@@ -78,7 +78,8 @@ class DynamicCase:
     """s."""
     second_order: bool = False
     """Whether the frame has the geometric stiffness (P–Δ) of its state at rest, see
-    :mod:`aframe_env.rfem.second_order`; that of the rope is there in any case."""
+    :mod:`aframe_env.rfem.second_order`; where it luffs, at rest at each of the angles that have modes of their own.
+    That of the rope is there in any case."""
     step: float = 2.5e-3
     """Of frame, load and drum, s; made a little smaller so that a whole number of them makes an output interval."""
     output_interval: float = 0.05
@@ -92,8 +93,6 @@ class DynamicCase:
         if self.output_interval > self.duration:
             raise InvalidValue(f"output_interval = {self.output_interval} s: must be in (0, {self.duration:g}] s")
         elastic = self.scenario.crane.frame.structure.servomotor.stiffness
-        if self.second_order and self.scenario.luffing is not None:
-            raise InvalidValue("second_order = True: must be False with luffing, as the state at rest changes")
         if self.strokes is not None and elastic is not None:
             raise InvalidValue("strokes: must be None with elastic servomotors, as only rigid ones have a given length")
         if self.scenario.luffing is not None:
@@ -198,7 +197,10 @@ class _Run:
         angle = self.model.frame.luffing_angle if self.luffed is None else self.luffed.swing.angle[index]
         node = int(np.argmin(np.abs(self.nodes - angle)))
         if node not in self.stages:
-            model = self.model if self.luffed is None else model_at(self.model, float(self.nodes[node]))
+            model = self.model
+            if self.luffed is not None:
+                model = model_at(model, float(self.nodes[node]))
+                model = at_rest(self.scenario, model) if self.case.second_order else model
             self.stages[node] = Stage(model, self.carriage, self.luffed, self.step)
         return self.stages[node]
 
@@ -357,22 +359,20 @@ def simulate(case: DynamicCase | None = None, *, model: FrameModel | None = None
     if frame.frame != what.scenario.crane.frame:
         raise InvalidValue("model: must have been made of the frame of the scenario's crane")
     if what.second_order:
-        hanging = LoadCase(rope_tension=what.scenario.weight, second_order=True)
-        frame = static(what.scenario.crane, hanging, model=frame).model
+        frame = at_rest(what.scenario, frame)
     run = _Run(what, frame)
     run.start()
     count = run.outputs + 1
     full = np.zeros((count, 2, frame.structure.size))
     body = np.zeros((count, 11))
     forces, across = np.zeros((count, 3)), np.zeros((count, 2))
-    servomotors: list[TurningServomotors] = []
+    stages: list[Stage] = []
 
     def store(output: int) -> None:
         full[output] = run.state(output * run.inner)
         body[output] = [*run.load, *run.load_velocity, *run.rope, run.angle, run.rate]
         forces[output], across[output] = run.force[:3] + run.force[6:], run.across
-        if run.stage.servomotors is not None:
-            servomotors.append(run.stage.servomotors)
+        stages.append(run.stage)
 
     store(0)
     for output in range(1, count):
@@ -397,9 +397,9 @@ def simulate(case: DynamicCase | None = None, *, model: FrameModel | None = None
         stroke=None if what.strokes is None else run.stroke[:, kept],
     )
     if run.luffed is not None:
-        residual = full[:, 0] @ frame.stiffness + full[:, 1] @ frame.damping - force
-        rows = zip(range(0, run.times.size, run.inner), residual, across, run.stroke[2, kept], strict=True)
-        reactions = np.array([item.reactions(*row) for item, row in zip(servomotors, rows, strict=True)])
+        others = full[:, 1] @ frame.damping - force
+        rows = zip(range(0, run.times.size, run.inner), full[:, 0], others, across, run.stroke[2, kept], strict=True)
+        reactions = np.array([stage.reactions(*row) for stage, row in zip(stages, rows, strict=True)])
         history = replace(history, luffed=run.luffed.every(run.inner), held=reactions)
     frame.warn_of_rotation(full[:, 0])
     return DynamicResult(

@@ -32,6 +32,7 @@ class Stage:
         """None where the frame does not luff."""
         self.depends = carriage.turns or luffed is not None
         """Whether the forces depend on the state of the modes."""
+        self._stiffness = model.stiffness
         # Forces on the modes, and what the servomotors' own constraints take of the same forces.
         rows = self.shape.T if luffed is None else np.vstack([self.shape.T, model.constraints.particular[:, :2].T])
         self._carriage, self._uniform = carriage, rows @ model.uniform_field()
@@ -72,6 +73,11 @@ class Stage:
             across, stroke[2] = servomotors.coupled(index, (place, rates), stroke, (acting[:count], acting[count:]))
             total = total[:count] + across @ servomotors.across_modes
         return total + self._by_stroke @ stroke[1:].ravel(), across
+
+    def reactions(self, index: int, position: Array, others: Array, across: Array, bend: Array) -> Array:
+        """All reactions on a frame that luffs, see ``TurningServomotors.reactions``, by q and L q̇ less the forces."""
+        assert self.servomotors is not None
+        return self.servomotors.reactions(index, self._stiffness @ position + others, across, bend)
 
 
 class TurningServomotors:

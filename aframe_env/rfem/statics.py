@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +18,7 @@ from aframe_env.scenario.crane import GRAVITY, Vector
 from aframe_env.validation import InvalidValue, require_choice, require_number, require_vector
 
 if TYPE_CHECKING:
+    from aframe_env.scenario import Scenario
     from aframe_env.scenario.crane import Crane
 
 LOADED_POINTS = ("S", "N_R", "N_L", "B_R", "B_L")
@@ -205,6 +206,12 @@ def generalised_forces(model: FrameModel, forces: Mapping[str, Array]) -> Array:
     for name, force in forces.items():
         total += (model.to_deck.T @ force) @ model.structure.translation(name)
     return total
+
+
+def at_rest(scenario: Scenario, model: FrameModel) -> FrameModel:
+    """The model with the geometric stiffness of its state under its own weight and the load at rest."""
+    case = LoadCase(rope_tension=scenario.weight, second_order=True)
+    return static(replace(scenario.crane, frame=model.frame), case, model=model).model
 
 
 def solve(model: FrameModel, right: Array, lengthening: Array | None = None) -> Array:

@@ -34,16 +34,19 @@ def swinging(material: Material | None = None, duration: float = 8.0, **changes:
     return Scenario.paper(crane=Crane(frame=frame), luffing=luffing, **changes)
 
 
-@pytest.mark.parametrize(("stiffer", "columns"), [(10.0, COLUMNS), (1.0, LITTLE_SECOND_ORDER)])
-def test_swing_is_that_of_a_multibody_program(stiffer, columns):
-    run = swing_run(stiffer)
+@pytest.mark.parametrize(
+    ("stiffer", "second_order", "columns"),
+    [(10.0, False, COLUMNS), (1.0, False, LITTLE_SECOND_ORDER), (1.0, True, COLUMNS)],
+)
+def test_swing_is_that_of_a_multibody_program(stiffer, second_order, columns):
+    run = swing_run(stiffer, second_order)
     assert {column: run.error(column) for column in columns if run.error(column) > 0.01} == {}
     assert run.here["luffing_rad"] == pytest.approx(run.there["luffing_rad"], abs=1e-7)
     assert run.here["luffing_rad"][[0, -1]] == pytest.approx([INBOARD, OUTBOARD])
 
 
 def test_what_the_linear_frame_leaves_out_of_a_swing_is_of_second_order():
-    run = swing_run()
+    run = swing_run(1.0, False)
     rest = forces_at_rest(INBOARD, run.there["T_rope_N"][0], second_order=True)
     for column in FRAME_COLUMNS:
         exact = run.there[column][0]
@@ -61,6 +64,22 @@ def test_frame_that_holds_is_that_of_the_ordinary_model_by_the_modes_of_another_
     for column in ("xL1_m", "xL3_m", "T_rope_N", "uS1_m", "uS3_m", "S_R_N", "RAR1_N", "RAR2_N", "RAL3_N"):
         gap = np.abs(here[column] - there[column]).max()
         assert 0.0 < gap < 1e-4 * np.ptp(there[column]), column
+
+
+def test_frame_that_holds_has_the_geometric_stiffness_of_one_that_never_luffs():
+    held = Luffing(points=((0.0, OUTBOARD), (1.0, OUTBOARD)))
+    here, there, linear = (
+        dynamic_columns(
+            simulate(
+                DynamicCase(scenario=Scenario.paper(luffing=luffing), duration=1.0, second_order=second),
+                model=frame_model(Frame(), COARSE),
+            )
+        )
+        for luffing, second in ((held, True), (None, True), (None, False))
+    )
+    for column in ("uS1_m", "uS3_m", "S_R_N", "RAR1_N", "RAR2_N", "RAL3_N"):
+        gap, of_second_order = (np.abs(each[column] - there[column]).max() for each in (here, linear))
+        assert gap < 1e-5 * of_second_order, column
 
 
 def test_slow_frame_is_in_the_equilibrium_of_a_crane_built_anew():
@@ -137,3 +156,7 @@ def test_what_cannot_luff_is_named():
         DynamicCase(scenario=replace(swinging(), crane=crane))
     with pytest.raises(InvalidValue, match="strokes: must be None with luffing"):
         DynamicCase(scenario=swinging(), strokes=(Stroke.smooth(0.01, 1.0),) * 2)
+    case = DynamicCase(scenario=swinging(), duration=0.1, step=0.01, output_interval=0.01, second_order=True)
+    result = simulate(case, model=frame_model(swinging().crane.frame, COARSE))
+    with pytest.raises(InvalidValue, match="second_order = True: must be False for a balance with luffing"):
+        energy_balance(result)

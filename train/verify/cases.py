@@ -57,7 +57,8 @@ its own weight stays; undamped:
   duration = 60.0              s
   output_interval = 0.05       s
   step = 0.0025                s
-  second_order = false         true: the frame with the geometric stiffness (P-Delta) of its state at rest
+  second_order = false         true: the frame with the geometric stiffness (P-Delta) of its state at rest,
+                               of a frame that luffs at each angle of its modes
                                and the keys of a scenario file, among them
   load_mass = 100000.0         kg
   target_level = -300.0        m, h: the load's height at rest with the frame rigid
