@@ -6,6 +6,9 @@ import numpy as np
 
 from aframe_env.scenario.crane import GRAVITY
 from aframe_env.scenario.sensors import Sensors
+from aframe_env.validation import InvalidValue
+from agents.control.chain import Chains
+from agents.control.chain_filter import ChainFilter
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import ALL, FloatArray, Rows
 from agents.control.kalman import RopeFilter, WaveBank, WaveFilter
@@ -41,7 +44,7 @@ class KalmanObserver:
         self.heard = np.ones(rows, dtype=np.bool_)
         """(N,) whether the latest reading of the heave rate was one: in a dropout the last one stays, to the bit."""
         self.waves = WaveFilter(rows, hoists.period, hold, bank)
-        self.load = RopeFilter(rows, bank.rate_noise)
+        self.load: RopeFilter | ChainFilter = RopeFilter(rows, bank.rate_noise)
         self.lateness = Lateness(rows, hoists.period, len(self._turns)) if adapts else None
         self._heave_rate, self._true_rate, self._drum_angle, self._first_angle, self._depth_error = np.zeros((5, rows))
 
@@ -57,7 +60,7 @@ class KalmanObserver:
     def retune(self, longer: FloatArray) -> None:
         """Go on with the hoists as they are now, the ropes ``longer`` (N,) by that factor; what is known stays."""
         self.model.replace(ALL, self._hoists.model(self._damping_ratio))
-        self.load.retune(self.model, self._hoists.period, self._stretch_noise(ALL), longer)
+        self._retune_load(longer)
 
     def advance(self, turned: FloatArray, o: Columns) -> None:
         """Take the readings a control step later, during which the drums turned by ``turned`` (N,) rad."""
@@ -70,14 +73,19 @@ class KalmanObserver:
 
     def state(self) -> FloatArray:
         """State z (N, 4) of the rope's model, now."""
-        hoists, still = self._hoists, np.zeros(len(self._hoists.frequency))
+        hoists = self._hoists
         rises = np.diff(self.waves.path(hoists.period * np.arange(len(self._turns) + 1.0)), axis=0)
-        depth_error, stretch = self._depth_error, self.load.stretch
-        z = np.stack([depth_error, self.load.load_velocity, depth_error + stretch, still], axis=1)
-        for rise, turn in zip(rises, self._turns, strict=True):
-            z[:, 3] = 0.0
-            z = self.model.advance(z, (rise - hoists.winch.radius * turn) / hoists.period)
+        z = self._carried((rises - hoists.winch.radius * self._turns) / hoists.period)
         z[:, 3] = self.waves.rate(self._times(1))[0] - hoists.winch.radius * hoists.winch.speed
+        return z
+
+    def _carried(self, speeds: FloatArray) -> FloatArray:
+        """State (N, 4) but for the last, by mean ``speeds`` (delay, N) m/s of the rope's end since the readings."""
+        depth_error, stretch = self._depth_error, self.load.stretch
+        z = np.stack([depth_error, self.load.load_velocity, depth_error + stretch, np.zeros_like(stretch)], axis=1)
+        for speed in speeds:
+            z[:, 3] = 0.0
+            z = self.model.advance(z, speed)
         return z
 
     def rises(self, steps: int) -> FloatArray:
@@ -101,8 +109,7 @@ class KalmanObserver:
         return times if self.lateness is None else times[:, None] + self.lateness.seconds
 
     def _start(self, o: Columns, rows: Rows) -> None:
-        model = self._hoists.model(self._damping_ratio, rows)
-        self.load.start(model, self._hoists.period, self._stretch_noise(rows), rows)
+        self._start_load(rows)
         self.waves.start(rows)
         self._heave_rate[rows], self._drum_angle[rows] = o["pulley_velocity_z"], o["drum_angle"]
         self._first_angle[rows], self._depth_error[rows] = o["drum_angle"], 0.0
@@ -112,6 +119,14 @@ class KalmanObserver:
             self.waves.find(o["pulley_velocity_z"], o["depth_error"], rows)
             self._true_rate[rows] = self.waves.rate(np.zeros(1))[0][rows]
             self._depth_error[rows] = self.waves.heave()[rows]
+
+    def _start_load(self, rows: Rows) -> None:
+        assert isinstance(self.load, RopeFilter)
+        self.load.start(self.model.some(rows), self._hoists.period, self._stretch_noise(rows), rows)
+
+    def _retune_load(self, longer: FloatArray) -> None:
+        assert isinstance(self.load, RopeFilter)
+        self.load.retune(self.model, self._hoists.period, self._stretch_noise(ALL), longer)
 
     def _stretch_noise(self, rows: Rows) -> FloatArray:
         """Standard deviation (n,) m of a reading of the ropes' stretch."""
@@ -133,8 +148,47 @@ class KalmanObserver:
         self._heave_rate, self._true_rate, self._drum_angle = heave_rate, true_rate, drum_angle
         self.load.advance(speed, self._hoists.stretch(o))
         below = radius * (drum_angle - self._first_angle) + self.load.stretch
-        self.waves.correct(o["depth_error"] - self.waves.heave() + below)
+        self.waves.correct(self._missed(o["depth_error"], self.waves.heave(), below))
         self._depth_error = self.waves.heave() - below
+
+    def _missed(self, depth_error: FloatArray, heave: FloatArray, below: FloatArray) -> FloatArray:
+        """How far a reading (N,) m is from the pulley's heave less the rope's growth ``below`` it, both estimated."""
+        return depth_error - heave + below
+
+
+class ChainObserver(KalmanObserver):
+    """``KalmanObserver`` whose filter of the load knows the rope's mass and the water's drag.
+
+    And a depth that comes later than all else, as sound does from a deep load, is compared with what it was then.
+    """
+
+    def __init__(self, hoists: HoistBatch, damping_ratio: float, sensors: Sensors, waves: ExpectedWaves) -> None:
+        super().__init__(hoists, damping_ratio, sensors, waves)
+        rows = len(hoists.frequency)
+        self.load: ChainFilter = ChainFilter(rows, WaveBank.of(waves, sensors).rate_noise)
+        self._reckoned = np.zeros((round(sensors.depth_error.delay / hoists.period) + 1, rows))
+        """Depth errors (steps + 1, N) m as estimated, from the moment that a depth is read of to that of the rest."""
+
+    def _carried(self, speeds: FloatArray) -> FloatArray:
+        now = self.load.carried(self._depth_error, speeds)
+        return np.column_stack([now, np.zeros(len(now))])
+
+    def _missed(self, depth_error: FloatArray, heave: FloatArray, below: FloatArray) -> FloatArray:
+        self._reckoned = np.concatenate([self._reckoned[1:], (heave - below)[None]])
+        return np.asarray(depth_error - self._reckoned[0])
+
+    def _start_load(self, rows: Rows) -> None:
+        self._reckoned[:, rows] = 0.0
+        self.load.start(*self._tuned(rows), rows)
+
+    def _retune_load(self, longer: FloatArray) -> None:
+        self.load.retune(*self._tuned(ALL), longer)
+
+    def _tuned(self, rows: Rows) -> tuple[Chains, float, FloatArray, FloatArray]:
+        hoists = self._hoists
+        length = hoists.rope_length[rows]
+        softness = hoists.stretch_under(np.ones_like(length), {"rope_length": length}, rows)
+        return hoists.chains(rows), hoists.period, softness, self._stretch_noise(rows)
 
 
 class StateObserver:
@@ -198,10 +252,22 @@ Observer = KalmanObserver | StateObserver
 
 
 def observer_for(
-    hoists: HoistBatch, damping_ratio: float, sensors: Sensors | None, waves: ExpectedWaves, adapts: bool = False
+    hoists: HoistBatch,
+    damping_ratio: float,
+    sensors: Sensors | None,
+    waves: ExpectedWaves,
+    adapts: bool = False,
+    chains: bool = False,
 ) -> Observer:
-    """Observer of hoists with these sensors; None where the full state is observed, which is never late."""
+    """Observer of hoists with these sensors; None where the full state is observed, which is never late.
+
+    ``chains``: it knows the ropes' mass and the water's drag; not together with ``adapts``.
+    """
     require_readings(adapts, sensors)
+    if adapts and chains:
+        raise InvalidValue("adapts = True, chains = True: must be one of both at most")
     if sensors is None:
         return StateObserver(hoists, damping_ratio, waves)
+    if chains:
+        return ChainObserver(hoists, damping_ratio, sensors, waves)
     return KalmanObserver(hoists, damping_ratio, sensors, waves, adapts)

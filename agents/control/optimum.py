@@ -25,6 +25,7 @@ from aframe_env.dynamics.start import critical_damping
 from aframe_env.scenario import Scenario
 from aframe_env.simulation import Simulation
 from aframe_env.validation import InvalidValue
+from agents.control.chain import drag_of
 from agents.control.interior_point import BoundedTracking
 from agents.control.inverse_dynamics import InverseDynamics, RequiredRope
 from agents.control.winch import WinchModel
@@ -193,7 +194,7 @@ def _optimise(
         chosen = [scenarios[i] for i in active.tolist()]
         for i in active.tolist():
             if scenarios[i].water is not None:
-                drag = _drag_rate(scenarios[i], best.error_rate[i])
+                drag = drag_rate(scenarios[i], best.error_rate[i])
                 model[:, i] = _rope_model(scenarios[i], config.control_period, drag)
         change = _gauss_newton(chosen, config, model[:, active], best.rows(active), number)
         wanted = np.concatenate([best.speed[active, 1:] + size * change for size in STEP_SIZES])
@@ -283,17 +284,14 @@ def _gauss_newton(
     return np.asarray(np.cumsum(problem.solve()[0], axis=1))
 
 
-def _drag_rate(scenario: Scenario, velocity: FloatArray) -> float:
+def drag_rate(scenario: Scenario, velocity: FloatArray) -> float:
     """Rate 1/s at which drag slows down what bobs as ``velocity`` (n,) m/s: that of the linear drag of as much work."""
     square = float(np.sum(velocity**2))
     if scenario.water is None or square == 0.0:
         return 0.0
     mean = float(np.sum(abs(velocity) ** 3)) / square
-    rope, length = scenario.crane.rope, scenario.lengths[0]
-    # Along the rope the speed falls from the load's to that of the still pulley, and the work with its cube.
-    area = scenario.load.drag_area_vertical + rope.tangential_drag * np.pi * rope.solid_diameter * length / 4.0
     # A change of the velocity meets twice the drag that the velocity itself does.
-    return 2.0 * 0.5 * scenario.water.density * area * mean / scenario.moved_mass
+    return 2.0 * drag_of(scenario, scenario.lengths[0]) * mean / scenario.moved_mass
 
 
 def _rope_model(scenario: Scenario, period: float, drag: float = 0.0) -> FloatArray:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from aframe_env.scenario.crane import GRAVITY
 from aframe_env.task import SENSED, STATE, Quantity
 from aframe_env.validation import InvalidValue, require_number
+from agents.control.chain import Chains, Hanging
 from agents.control.filters import ALL, FloatArray, Rows
 from agents.control.lift import LEAST_WEIGHT, Lift, Unweighed, unweighed
 from agents.control.rope import RopeModel
@@ -96,6 +97,7 @@ class HoistBatch:
         self._least_effort = np.zeros(rows)
         self._drum_radius = np.ones(rows)
         self._unweighed = np.zeros((len(Unweighed._fields), rows))
+        self._lifts = np.empty(rows, dtype=object)
         self.heavy = np.zeros(rows, dtype=np.bool_)
         """(N,) rows whose rope has mass, or is in water."""
 
@@ -107,6 +109,7 @@ class HoistBatch:
         """
         self.winch.start([lift.crane for lift in lifts], rows)
         o = self.columns(observation)
+        self._lifts[rows] = lifts
         self._axial_stiffness[rows] = [lift.crane.rope.axial_stiffness for lift in lifts]
         self._weight[rows] = np.maximum(o["rope_tension"], LEAST_WEIGHT)
         lengths = o["rope_length"].tolist()
@@ -151,6 +154,11 @@ class HoistBatch:
     def model(self, damping_ratio: float, rows: Rows = ALL) -> RopeModel:
         """Linear model of the loads and ropes."""
         return RopeModel.of(self.frequency[rows], damping_ratio, self.period)
+
+    def chains(self, rows: Rows = ALL) -> Chains:
+        """The same with the ropes' mass and the water's drag."""
+        each = zip(self._lifts[rows], self.rope_length[rows].tolist(), self.mass[rows].tolist(), strict=True)
+        return Chains.of([Hanging.weighed(*one) for one in each], self.period)
 
     def regulator(self, gains: Gains) -> Regulator:
         """Feedback law for the loads and ropes."""

@@ -25,15 +25,22 @@ class RopeModel:
     """(N, 4)."""
 
     @classmethod
-    def of(cls, frequency: FloatArray, damping_ratio: float | FloatArray, period: float) -> RopeModel:
+    def of(
+        cls,
+        frequency: FloatArray,
+        damping_ratio: float | FloatArray,
+        period: float,
+        drag: float | FloatArray = 0.0,
+    ) -> RopeModel:
         """Model of loads that bob on their ropes at ``frequency`` (N,) rad/s, sampled every ``period`` s.
 
-        ``damping_ratio``: share of critical, one for all or (N,).
+        ``damping_ratio``: share of critical; ``drag``: rate 1/s at which water slows the loads down. Both one for all
+        or (N,).
         """
         rate = np.zeros((len(frequency), 4, 4))
         rate[:, 0, 1] = 1.0
         rate[:, 1, 0] = -(frequency**2)
-        rate[:, 1, 1] = -2.0 * damping_ratio * frequency
+        rate[:, 1, 1] = -2.0 * damping_ratio * frequency - drag
         rate[:, 1, 2] = frequency**2
         rate[:, 1, 3] = 2.0 * damping_ratio * frequency
         rate[:, 2, 3] = 1.0

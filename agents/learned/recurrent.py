@@ -57,13 +57,19 @@ class RecurrentCard:
     """sha256 of the file of weights."""
     adapts: bool = False
     """Whether it reckons how much later than told readings and winch are."""
+    chains: bool = False
+    """Whether it reckons with the rope's mass and the water's drag."""
     format: int = FORMAT
 
     @property
     def made_for(self) -> LookoutConfig:
         """What its inputs are made for."""
         return LookoutConfig(
-            control_period=self.control_period, sensors=self.sensors, waves=self.waves, adapts=self.adapts
+            control_period=self.control_period,
+            sensors=self.sensors,
+            waves=self.waves,
+            adapts=self.adapts,
+            chains=self.chains,
         )
 
     def network(self) -> RecurrentNetwork:

@@ -21,6 +21,7 @@ from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE, quantities
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import FloatArray
+from agents.control.kalman import RopeFilter
 from agents.control.lateness import require_readings
 from agents.control.lift import Lift
 from agents.control.observer import KalmanObserver, observer_for
@@ -54,17 +55,23 @@ class LookoutConfig:
     adapts: bool = False
     """Reckon how much later than told readings and winch are, and look that much further ahead; on sensors alone."""
 
+    chains: bool = False
+    """Reckon with the rope's mass and the water's drag in the filter of the load."""
+
     def __post_init__(self) -> None:
         require_readings(self.adapts, self.sensors)
 
     @classmethod
     def of(cls, task: TaskConfig) -> LookoutConfig:
         """For the agents of a task."""
+        source, sensed = task.source, task.sensors is not None
+        adapts = sensed and _is_late(source)
         return cls(
             control_period=task.control_period,
             sensors=task.sensors,
-            waves=ExpectedWaves.of(task.source),
-            adapts=task.sensors is not None and _is_late(task.source),
+            waves=ExpectedWaves.of(source),
+            adapts=adapts,
+            chains=sensed and not adapts and bool(source.water or source.crane.rope.mass_per_length),
         )
 
     @property
@@ -118,7 +125,9 @@ class Lookout:
 
     def __init__(self, rows: int, config: LookoutConfig) -> None:
         self._hoists = HoistBatch(rows, config.control_period, STATE if config.sensors is None else SENSED)
-        self._observer = observer_for(self._hoists, DAMPING_RATIO, config.sensors, config.waves, config.adapts)
+        self._observer = observer_for(
+            self._hoists, DAMPING_RATIO, config.sensors, config.waves, config.adapts, config.chains
+        )
         self._previewed = PreviewedPath.of(config.sensors, rows, config.control_period)
         self._scales = _SENSED_SCALES if config.sensors else _STATE_SCALES
         self._has_motion_unit = config.has_motion_unit
@@ -139,6 +148,7 @@ class Lookout:
     def load_gain(self) -> FloatArray:
         """(N, 4) gain of the filter of the load at the latest readings, on sensors."""
         assert isinstance(self._observer, KalmanObserver)
+        assert isinstance(self._observer.load, RopeFilter)
         return self._observer.load.gain
 
     @property

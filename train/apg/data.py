@@ -22,8 +22,9 @@ from aframe_env.dynamics.start import critical_damping
 from aframe_env.scenario import Scenario
 from aframe_env.simulation import Simulation
 from aframe_env.validation import InvalidValue
+from agents.control.chain import Chains, Hanging
 from agents.control.inverse_dynamics import RequiredRope
-from agents.control.optimum import optimise
+from agents.control.optimum import drag_rate, optimise
 from agents.control.rope import RopeModel
 from agents.learned.recurrent_inputs import Lookout, LookoutConfig
 from agents.policy import DrumStill, FloatArray
@@ -32,6 +33,8 @@ from train.apg.estimates import Estimates
 
 PREVIEW: Final = 90
 """Control steps beyond an episode's end that the pulley's path is recorded for: what the teacher sees ahead."""
+LONG_PREVIEW: Final = 160
+"""The same where loads bob as slowly as the waves, on ropes with mass or in water."""
 OPTIMUM_ROUNDS: Final = 8
 """Gauss-Newton steps of the optimum: what further ones gain is of no account here."""
 LEAST_CEILING: Final = 0.3
@@ -74,13 +77,14 @@ class Recordings:
     rise: Array
     """(N, n) foretold speed of the pulley in the coming step, as in ``Outlook``, m/s."""
     path: Array
-    """(N, n + 1 + PREVIEW) length of rope since the start that would hold the load still, m."""
+    """(N, n + 1 + preview) length of rope since the start that would hold the load still, m."""
     path_speed: Array
-    """(N, n + 1 + PREVIEW) its rate, m/s."""
-    frequency: Array
-    """(N,) of the load's bobbing, rad/s."""
-    damping: Array
-    """(N,) of it, share of critical."""
+    """(N, n + 1 + preview) its rate, m/s."""
+    transition: Array
+    """(N, S, S + 1), and ``drag`` (N, S): of ``Chains``; (N, 3, 4) and zeros for ropes without mass in air."""
+    drag: Array
+    bobbing: Array
+    """(N, 4, 4) of ``RopeModel``, with what the water's drag would do to it at the speeds of the optimum."""
     most_change: Array
     """(N,) what is true of ``told_change``."""
     most_speed: Array
@@ -91,6 +95,11 @@ class Recordings:
     """(N,) root mean square depth error with the drum left still, m."""
     best: Array
     """(N,) and with the best drum commands."""
+
+    @property
+    def preview(self) -> int:
+        """Control steps that the paths go on beyond an episode's end."""
+        return int(self.path.shape[1] - 1 - self.rise.shape[1])
 
     @property
     def period(self) -> float:
@@ -113,8 +122,8 @@ class Recordings:
         return cls(parts[0].made_for, **arrays)
 
     def model(self) -> RopeModel:
-        """True model of the loads on their ropes."""
-        return RopeModel.of(self.frequency, self.damping, self.period)
+        """Model of the loads' bobbing, as it truly is."""
+        return RopeModel(self.bobbing, self.bobbing[:, :, 3].copy())
 
     def shares(self, rms: torch.Tensor) -> torch.Tensor:
         """Shares (N,) of the ceiling for depth errors (N,) m."""
@@ -122,17 +131,22 @@ class Recordings:
         return (still - rms) / (still - best)
 
     def tensors(self) -> dict[str, torch.Tensor]:
-        """Arrays as tensors, and the ``transition`` of ``Twin``; of the series' precision."""
+        """Arrays as tensors of the series' precision."""
         precision = torch.from_numpy(self.series).dtype
-        arrays = {**self.arrays(), "transition": self.model().a[:, :3]}
+        arrays = self.arrays()
         return {name: torch.from_numpy(np.ascontiguousarray(array)).to(precision) for name, array in arrays.items()}
 
 
-def require_linear(scenarios: Sequence[Scenario]) -> None:
+def require_known(scenarios: Sequence[Scenario]) -> None:
     """Raise unless the twin knows all of these lifts."""
     for scenario in scenarios:
-        if not scenario.is_light:
-            raise InvalidValue("a heavy rope, water or a target that moves: the twin of train.apg knows none of them")
+        moves = scenario.target_path is not None or scenario.luffing is not None
+        bed = scenario.water is not None and scenario.water.seabed is not None
+        if moves or bed or scenario.load.height or not scenario.crane.is_plain:
+            raise InvalidValue(
+                "a target or a frame that moves, a seabed, a load with a height, a compensator, friction at the pulley "
+                "or a winch with more limits than speed, acceleration and lag: the twin of train.apg knows none of them"
+            )
         if (scenario.sensor_delay or 0.0) > GREATEST_DELAY:
             raise InvalidValue(
                 f"sensor_delay = {scenario.sensor_delay:g} s: must be at most {GREATEST_DELAY:g} s for the twin of "
@@ -140,12 +154,17 @@ def require_linear(scenarios: Sequence[Scenario]) -> None:
             )
 
 
+def lengthening(scenarios: Sequence[Scenario]) -> FloatArray:
+    """Rope (N,) below the pulley for each metre that the drum pays out; a light rope is reckoned at the drum."""
+    return np.array([1.0 if scenario.is_light else 1.0 + scenario.pulley_strain for scenario in scenarios])
+
+
 def required_path(scenarios: Sequence[Scenario], period: float, steps: int) -> tuple[FloatArray, FloatArray]:
     """Length of rope (N, steps + 1) m since the start that would hold the loads still, and its rate, m/s."""
-    rope = RequiredRope(scenarios, period)
+    rope, longer = RequiredRope(scenarios, period), lengthening(scenarios)
     half = np.empty((2 * steps + 2, len(scenarios)))
     for i in range(len(half)):
-        half[i] = rope.now()
+        half[i] = longer * rope.now()
         rope.advance()
     rate = np.zeros((steps + 1, len(scenarios)))
     rate[1:] = (half[3::2] - half[1:-1:2]) / period
@@ -168,27 +187,30 @@ def told_softness(scenarios: Sequence[Scenario]) -> FloatArray:
 
 def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Recordings:
     """Record an episode of each scenario; ``seed`` of the sensors' noise. Those of no use are left out."""
-    require_linear(scenarios)
+    require_known(scenarios)
     count, steps, period = len(scenarios), config.steps, config.control_period
     optimum = optimise(scenarios, config, rounds=OPTIMUM_ROUNDS)
     still = run(DrumStill(), scenarios, config)
-    path, path_speed = required_path(scenarios, period, steps + PREVIEW)
+    light = all(scenario.is_light for scenario in scenarios)
+    path, path_speed = required_path(scenarios, period, steps + (PREVIEW if light else LONG_PREVIEW))
     made_for = LookoutConfig.of(config)
     lookout, adapts = Lookout(count, made_for), made_for.adapts
     simulation = Simulation(count, config.replaced(scenario=scenarios[0], observation=config.sensors or "state"))
     noise = np.random.default_rng(seed).integers(2**63, size=count).tolist()
     simulation.reset_rows(np.arange(count), list(zip(scenarios, noise, strict=True)))
-    radius = np.array([scenario.crane.winch.drum_radius for scenario in scenarios])
     taut, start = np.ones(count, dtype=np.bool_), np.zeros((count, 3))
+    longer = lengthening(scenarios)
+    radius = longer * [scenario.crane.winch.drum_radius for scenario in scenarios]
     series, error, rise = [], np.empty((count, steps, 4)), np.empty((count, steps))
     gain = np.zeros((count, steps if adapts else 0, 4))
     reading, softness = readings(scenarios, config), told_softness(scenarios)
     estimates: Estimates | None = None
-    paid_out = np.zeros(count)
+    paid_out, velocity = np.zeros(count), np.empty((count, steps))
     for step in range(steps):
         seen = simulation.observe()
         outlook = lookout.advance(seen) if step else lookout.start(seen, [each.as_told for each in scenarios])
         true = simulation.state
+        velocity[:, step] = true[:, task.LOAD_VELOCITY_Z]
         rope_end = path[:, step] - radius * true[:, task.DRUM_ANGLE]
         rope_end_speed = path_speed[:, step] - outlook.speed
         state = np.stack([true[:, task.DEPTH_ERROR], true[:, task.LOAD_VELOCITY_Z], rope_end], axis=1)
@@ -206,6 +228,13 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
         taut &= simulation.results[:, task.SLACK] == 0.0
         paid_out = paid_out + radius * lookout.turned
     best = np.sqrt(optimum.omega1 / config.duration)
+    slowing = np.array([drag_rate(*each) for each in zip(scenarios, velocity, strict=True)])
+    frequency = np.array([scenario.rope_frequency for scenario in scenarios])
+    damping = np.array([s.total_rope_damping / critical_damping(s.rope_stiffness, s.moved_mass) for s in scenarios])
+    bobbing = RopeModel.of(frequency, damping, period, slowing).a
+    transition, drag = bobbing[:, :3], np.zeros((count, 3))
+    if not light:
+        transition, drag, _ = Chains.of([Hanging.of(scenario) for scenario in scenarios], period)
     winches = [scenario.crane.winch for scenario in scenarios]
     recordings = Recordings(
         made_for,
@@ -224,12 +253,11 @@ def record(scenarios: Sequence[Scenario], config: TaskConfig, seed: int) -> Reco
         rise=rise.astype(np.float32),
         path=path,
         path_speed=path_speed.astype(np.float32),
-        frequency=np.array([scenario.rope_frequency for scenario in scenarios]),
-        damping=np.array(
-            [each.total_rope_damping / critical_damping(each.rope_stiffness, each.moved_mass) for each in scenarios]
-        ),
-        most_change=np.array([winch.max_rope_acceleration * period for winch in winches]),
-        most_speed=np.array([winch.max_rope_speed for winch in winches]),
+        transition=transition,
+        drag=drag,
+        bobbing=bobbing,
+        most_change=longer * [winch.max_rope_acceleration * period for winch in winches],
+        most_speed=longer * [winch.max_rope_speed for winch in winches],
         lag=np.array([winch.lag / period for winch in winches]),
         still=still.rms,
         best=best,

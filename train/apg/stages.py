@@ -60,6 +60,7 @@ def to_policy(network: RecurrentNetwork, options: ApgOptions) -> tuple[Recurrent
         versions=versions(),
         sha256=digest(weights),
         adapts=config.adapts,
+        chains=config.chains,
     )
     return RecurrentPolicy(network, card), weights
 

@@ -1,6 +1,6 @@
 """The linear twin: load on its rope and winch of many lifts, in torch, so that a score can be differentiated.
 
-The load answers the rope's end as ``agents.control.rope.RopeModel`` has it, the drum follows its command within the
+The load answers the rope's end as ``agents.control.chain`` has it, the drum follows its command within the
 winch's greatest acceleration and with its lag, and the pulley goes its true way, which the engine told. What is left
 out is the rope's going slack, the swinging of the load while it is not where it should be, and the drum's ramp within a
 step: ``tests/train/apg/test_twin.py`` holds what that makes against the engine.
@@ -10,13 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import torch
 
 from agents.learned.recurrent_network import Load, RecurrentNetwork, clip_one_sided
 from train.apg.data import Recordings
 from train.apg.estimates import Estimates
+
+SAME: Final = 1e-3
+"""Share by which a winch may differ from what was told and still count as that."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,7 @@ class Twin:
     """
 
     transition: torch.Tensor
-    """(B, 3, 4): depth error, its rate and the rope's end after a step, of these and of its mean speed."""
+    """(B, S, S + 1), of ``Chains``."""
     winches: Winches
     """(D, B)."""
     reach: torch.Tensor
@@ -67,28 +70,36 @@ class Twin:
     told_speed: torch.Tensor
     """(B,) greatest speed of the rope at the drum, as told, m/s."""
     first: torch.Tensor
-    """(B, 3) state at the start."""
+    """(B, S) state at the start."""
     period: float
     """Control step, s."""
+    drag: torch.Tensor | None = None
+    """(B, S), of ``Chains``; None where all are in air."""
 
     @classmethod
     def of(cls, recordings: Recordings, tensors: Mapping[str, torch.Tensor]) -> Twin:
         """Of recorded lifts, whose ``tensors`` are those of the recordings."""
         r = tensors
         pairs = [(r["most_change"], r["told_change"]), (r["most_speed"], r["told_speed"]), (r["lag"], r["told_lag"])]
-        alike = recordings.made_for.sensors is None or all(torch.equal(true, told) for true, told in pairs)
+        # A drum's radius counts for as much more as a heavy rope is stretched, by the first reading of its tension.
+        alike = recordings.made_for.sensors is None or all(
+            torch.allclose(true, told, rtol=SAME, atol=0.0) for true, told in pairs
+        )
         winches = Winches(*(torch.stack((true,) if alike else (true, told)) for true, told in pairs))
         reach = (1.0 + r["told_lag"]) * r["told_change"]
-        return cls(r["transition"], winches, reach, r["told_speed"], r["start"], recordings.period)
+        drag = r["drag"] if r["drag"].any() else None
+        higher = r["start"].new_zeros(len(r["start"]), r["transition"].shape[1] - 3)
+        first = torch.cat([r["start"], higher], dim=1)
+        return cls(r["transition"], winches, reach, r["told_speed"], first, recordings.period, drag)
 
     def start(self) -> tuple[torch.Tensor, torch.Tensor]:
-        """State (B, 3) of the lifts at the start, and speeds (D, B) of their drums, which stand still."""
+        """State (B, S) of the lifts at the start, and speeds (D, B) of their drums, which stand still."""
         return self.first, torch.zeros_like(self.winches.lag)
 
     def advance(
         self, state: torch.Tensor, speed: torch.Tensor, share: torch.Tensor, rise: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Take a control step: state (B, 3), speeds (D, B) m/s at its end, and rope (B,) m paid out, as reckoned.
+        """Take a control step: state (B, S), speeds (D, B) m/s at its end, and rope (B,) m paid out, as reckoned.
 
         ``share`` (B,): change of the speed that is asked for, as a share of what the winch can; ``rise`` (B,) m of the
         length of rope that would hold the load still.
@@ -97,7 +108,13 @@ class Twin:
         command = clip_one_sided(asked, self.told_speed)
         mean, reached = self.winches.follow(speed, command.expand_as(speed))
         moved = torch.cat([state, (rise / self.period - mean[0])[:, None]], dim=1)
-        return (self.transition @ moved[:, :, None])[:, :, 0], reached, self.period * mean[-1]
+        after = (self.transition @ moved[:, :, None])[:, :, 0]
+        if self.drag is not None:
+            # As ``Chains.advance`` has it.
+            free = 0.5 * (state[:, 1:2] + after[:, 1:2])
+            velocity = 2.0 * free / (1.0 + torch.sqrt(1.0 - 2.0 * self.drag[:, 1:2] * free.abs()))
+            after = after + self.drag * (velocity.abs() * velocity)
+        return after, reached, self.period * mean[-1]
 
 
 class Rollout(NamedTuple):
@@ -134,12 +151,12 @@ def roll_out(network: RecurrentNetwork, recordings: Recordings, *, keep: bool = 
     square, kept = rise.new_zeros(count), []
     for step in range(steps):
         rope_end = r["path_speed"][:, step] - speed
-        estimate = state
+        estimate = state[:, :3]
         if estimates is not None and step:
-            estimate = estimates.advance(state, r["path"][:, step] - reckoned, r["gain"][:, step])
+            estimate = estimates.advance(state[:, :3], r["path"][:, step] - reckoned, r["gain"][:, step])
         z = torch.cat([estimate, rope_end[-1, :, None]], dim=1) + r["error"][:, step]
         if keep:
-            kept.append((torch.cat([state, rope_end[0, :, None]], dim=1), z, speed[0], speed[-1]))
+            kept.append((torch.cat([state[:, :3], rope_end[0, :, None]], dim=1), z, speed[0], speed[-1]))
         seen = Load(
             z,
             r["rise"][:, step],
