@@ -6,7 +6,6 @@ import numpy as np
 
 from aframe_env.scenario.crane import GRAVITY
 from aframe_env.scenario.sensors import Sensors
-from aframe_env.validation import InvalidValue
 from agents.control.chain import Chains
 from agents.control.chain_filter import ChainFilter
 from agents.control.expected_waves import ExpectedWaves
@@ -162,8 +161,10 @@ class ChainObserver(KalmanObserver):
     And a depth that comes later than all else, as sound does from a deep load, is compared with what it was then.
     """
 
-    def __init__(self, hoists: HoistBatch, damping_ratio: float, sensors: Sensors, waves: ExpectedWaves) -> None:
-        super().__init__(hoists, damping_ratio, sensors, waves)
+    def __init__(
+        self, hoists: HoistBatch, damping_ratio: float, sensors: Sensors, waves: ExpectedWaves, adapts: bool = False
+    ) -> None:
+        super().__init__(hoists, damping_ratio, sensors, waves, adapts)
         rows = len(hoists.frequency)
         self.load: ChainFilter = ChainFilter(rows, WaveBank.of(waves, sensors).rate_noise)
         self._reckoned = np.zeros((round(sensors.depth_error.delay / hoists.period) + 1, rows))
@@ -261,13 +262,11 @@ def observer_for(
 ) -> Observer:
     """Observer of hoists with these sensors; None where the full state is observed, which is never late.
 
-    ``chains``: it knows the ropes' mass and the water's drag; not together with ``adapts``.
+    ``chains``: it knows the ropes' mass and the water's drag, which the full state tells anyway.
     """
     require_readings(adapts, sensors)
-    if adapts and chains:
-        raise InvalidValue("adapts = True, chains = True: must be one of both at most")
     if sensors is None:
         return StateObserver(hoists, damping_ratio, waves)
     if chains:
-        return ChainObserver(hoists, damping_ratio, sensors, waves)
+        return ChainObserver(hoists, damping_ratio, sensors, waves, adapts)
     return KalmanObserver(hoists, damping_ratio, sensors, waves, adapts)

@@ -55,6 +55,8 @@ class PlanningConfig:
     """Motion of the pulley."""
     adapts: bool = False
     """Reckon how much later than told readings and winch are, and look that much further ahead; on sensors alone."""
+    chains: bool = False
+    """Reckon with the rope's mass and the water's drag in the filter of the load, on sensors."""
 
     def __post_init__(self) -> None:
         require_number("effort", self.price, "s²", low=1e-8, high=1e8)
@@ -111,7 +113,9 @@ class Planner:
         self._config = config
         self.period = control_period
         self.hoists = HoistBatch(rows, control_period, STATE if config.sensors is None else SENSED)
-        self._observer = observer_for(self.hoists, config.damping_ratio, config.sensors, config.waves, config.adapts)
+        self._observer = observer_for(
+            self.hoists, config.damping_ratio, config.sensors, config.waves, config.adapts, config.chains
+        )
         self._previewed = PreviewedPath.of(config.sensors, rows, control_period)
         self._turned, self._efforts = np.zeros(rows), np.ones(rows)
         self._k, self._cost_to_go = np.zeros((rows, 4)), np.zeros((rows, 4, 4))

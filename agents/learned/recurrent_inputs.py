@@ -19,6 +19,7 @@ from aframe_env.config import TaskConfig
 from aframe_env.scenario import ScenarioDistribution, ScenarioSource
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE, quantities
+from aframe_env.validation import InvalidValue
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import FloatArray
 from agents.control.kalman import RopeFilter
@@ -56,10 +57,12 @@ class LookoutConfig:
     """Reckon how much later than told readings and winch are, and look that much further ahead; on sensors alone."""
 
     chains: bool = False
-    """Reckon with the rope's mass and the water's drag in the filter of the load."""
+    """Reckon with the rope's mass and the water's drag in the filter of the load; not together with ``adapts``."""
 
     def __post_init__(self) -> None:
         require_readings(self.adapts, self.sensors)
+        if self.adapts and self.chains:
+            raise InvalidValue("adapts = True, chains = True: must be one of both at most")
 
     @classmethod
     def of(cls, task: TaskConfig) -> LookoutConfig:

@@ -5,11 +5,14 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from aframe_env import Crane, LoadShape, Rope, Scenario, Water
+from aframe_env import Crane, LoadShape, Rope, Scenario, TaskConfig, Water, find_task
 from agents.control.chain import STATE, Chains, Hanging
 from agents.control.chain_filter import ChainFilter
+from agents.control.expected_waves import ExpectedWaves
 from agents.control.kalman import RopeFilter
+from agents.control.predictive import PlanningConfig, PredictiveControl
 from agents.control.rope import RopeModel
+from agents.rollout import run
 
 PERIOD = 0.1
 SIX_STRAND = Rope.six_strand(loss_time=0.0)
@@ -121,3 +124,19 @@ def test_on_light_ropes_the_filter_is_the_rope_filter():
             mine.retune(chains, PERIOD, np.array([length / rope.axial_stiffness]), noise, np.array([1.2]))
     assert mine.stretch == pytest.approx(known.stretch, abs=1e-9)
     assert mine.load_velocity == pytest.approx(known.load_velocity, abs=1e-9)
+
+
+def test_a_law_whose_filter_knows_the_rope_leaves_less_of_the_heave():
+    """Eight lifts of DeepRope, half a minute long: a tenth less at the least in the mean."""
+    task = find_task("DeepRope")
+    config, scenarios = TaskConfig(**{**task.arguments, "episode_duration": 30.0}), task.scenarios("train", 8)
+    waves = ExpectedWaves.of(config.source)
+    knows, does_not = (
+        run(
+            PredictiveControl(PlanningConfig(sensors=config.sensors, horizon=80, waves=waves, chains=chains)),
+            scenarios,
+            config,
+        ).rms
+        for chains in (True, False)
+    )
+    assert knows.mean() < 0.9 * does_not.mean()
