@@ -18,9 +18,9 @@ import numpy as np
 from scipy.linalg import eigh, expm
 
 from aframe_env.scenario import Scenario
-from aframe_env.scenario.crane import Rope
+from aframe_env.scenario.crane import GRAVITY, Rope
 from agents.control.filters import FloatArray, Rows
-from agents.control.lift import Lift
+from agents.control.lift import LEAST_WEIGHT, Lift
 
 MODES: Final = 2
 """Modes of a rope with mass, the load's bobbing among them."""
@@ -28,6 +28,9 @@ STATE: Final = 2 * MODES + 1
 """Numbers of a state: depth error, its rate and where the rope's end is, m and m/s; the rest tells the higher modes."""
 ELEMENTS: Final = 12
 """Finite elements of a rope below the pulley."""
+
+LEAST_BELOW: Final = 1.0
+"""Least rope below the pulley that is reckoned with, m."""
 
 
 class Hanging(NamedTuple):
@@ -56,8 +59,9 @@ class Hanging(NamedTuple):
     def weighed(cls, lift: Lift, rope_length: float, mass: float) -> Hanging:
         """What is known on board: the lift, unstretched rope from drum to load, m, and the mass that bobs, kg."""
         rope, drum_part = lift.crane.rope, lift.crane.drum_to_pulley
-        below = rope_length - drum_part
-        inertia = mass - rope.mass_per_length * below / 3.0
+        below = max(rope_length - drum_part, LEAST_BELOW)
+        # A pin that reads less than the rope alone weighs must not make a load of less than nothing.
+        inertia = max(mass - rope.mass_per_length * below / 3.0, LEAST_WEIGHT / GRAVITY)
         return cls(rope, below, drum_part, inertia, drag_of(lift, below), rope.loss_time)
 
 

@@ -104,6 +104,9 @@ def test_what_is_weighed_on_board_is_what_hangs():
     true, known = Hanging.of(scenario), Hanging.weighed(scenario, scenario.free_length, scenario.moved_mass)
     assert known[1:] == pytest.approx(true[1:], rel=5e-3)
     assert true.inertia == 108e3
+    nothing = Chains.of([Hanging.weighed(scenario, 5.0, 0.0), Hanging.weighed(scenario, 2000.0, 100.0)], PERIOD)
+    assert np.isfinite(nothing.transition).all()
+    assert np.abs(np.linalg.eigvals(nothing.transition[:, :, :-1])).max() < 1.0 + 1e-9
 
 
 def test_on_light_ropes_the_filter_is_the_rope_filter():
