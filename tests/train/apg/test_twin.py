@@ -31,7 +31,7 @@ def twin_of(recordings):
     return Twin.of(recordings, r), r["path"].diff(dim=1)
 
 
-LIMITS = {"Storm": 1e-6, "Unknown": 1e-6, "DeepRope": 1e-3}
+LIMITS = {"Storm": 1e-6, "Unknown": 1e-6, "DeepRope": 1e-3, "MRU": 1e-6}
 """Error of the drum's speed, m/s: on a heavy rope winches are as much faster as the reading of its tension says."""
 
 
@@ -50,7 +50,7 @@ def drawn(name):
     return scenarios, config, record(scenarios, config, 0)
 
 
-@pytest.mark.parametrize("name", ["Storm", "Unknown", "DeepRope"])
+@pytest.mark.parametrize("name", ["Storm", "Unknown", "DeepRope", "MRU"])
 def test_the_twin_goes_where_the_engine_goes(name):
     """Speeds at random: depth errors of ten metres, of which the twin misses 2 % at the most."""
     scenarios, config, recordings = drawn(name)
