@@ -80,7 +80,13 @@ print(agents.drives.map.load().shape, agents.registry.choose("drive-map:clock").
     assert len(expected) == 8
     names = {"apg-state-storm": "recurrent APG"}
     expected += [f"{folder.name} ['{names.get(folder.name, 'recurrent APG on sensors')}']" for folder in recurrent]
-    assert [folder.name for folder in recurrent] == ["apg-preview", "apg-state-storm", "apg-storm", "apg-unknown"]
+    assert [folder.name for folder in recurrent] == [
+        "apg-deeprope",
+        "apg-preview",
+        "apg-state-storm",
+        "apg-storm",
+        "apg-unknown",
+    ]
     assert loaded == expected
     assert drive_map == "(5, 8, 5, 8) drive map by the clock"
     assert not list(tmp_path.iterdir())
