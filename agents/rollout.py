@@ -35,6 +35,8 @@ def noise_seeds(noise_seed: int, count: int) -> list[int]:
 
 HISTORY = (task.DEPTH_ERROR, task.DRUM_SPEED, task.ROPE_TENSION)
 """Columns of the state that are kept of every control step."""
+BED = (task.LANDINGS, task.LIFT_OFFS, task.LANDING_SPEED)
+"""Results that tell of the seabed."""
 BAND = 0.05
 """Depth error that an operator can live with, m: time beyond it is counted."""
 
@@ -66,6 +68,12 @@ class Episodes:
     """(N,) time with a depth error beyond ±BAND, and all that is left after a parted rope, s."""
     parted: npt.NDArray[np.bool_]
     """(N,) true if the rope parted."""
+    landings: npt.NDArray[np.int64]
+    """(N,) number of times that the load came down on the seabed."""
+    lift_offs: npt.NDArray[np.int64]
+    """(N,) and that it was lifted off it."""
+    landing_speed: FloatArray
+    """(N,) greatest speed of all landings, m/s; 0 without one."""
     error: npt.NDArray[np.float32]
     """(N, steps + 1) depth error at the control steps, m."""
     drum_speed: npt.NDArray[np.float32]
@@ -146,6 +154,7 @@ class _Tally:
         self._peak_tension = simulation.state[:, task.ROPE_TENSION].copy()
         self._drum_travel, self._peak_power, self._time_outside = np.zeros(rows), np.zeros(rows), np.zeros(rows)
         self._rope_speed = np.zeros(rows)
+        self._bed = np.zeros((len(BED), rows))
         self._record()
 
     def _record(self) -> None:
@@ -161,6 +170,7 @@ class _Tally:
         alive = self._alive
         self._omega1[alive] = results[alive, task.OMEGA1]
         self._omega2[alive] = results[alive, task.OMEGA2]
+        self._bed[:, alive] = results[alive][:, BED].T
         slack = alive & (results[:, task.SLACK] > 0.0)
         self._slack_events += slack & ~self._was_slack
         self._was_slack = slack
@@ -185,6 +195,9 @@ class _Tally:
             peak_power=self._peak_power,
             time_outside=self._time_outside,
             parted=~self._alive,
+            landings=self._bed[0].astype(np.int64),
+            lift_offs=self._bed[1].astype(np.int64),
+            landing_speed=self._bed[2],
             error=self._histories[0],
             drum_speed=self._histories[1],
             tension=self._histories[2],

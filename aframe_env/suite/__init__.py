@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from aframe_env.suite import deep_rope, mru, preview, storm, unknown
+from aframe_env.suite import deep_rope, landing, mru, preview, splash, storm, unknown
 from aframe_env.suite.definition import SPLITS, Seeds, Split, Task
 from aframe_env.validation import InvalidValue, shown
 
 TASKS: Final[Mapping[str, Task]] = {
-    task.name: task for task in (storm.TASK, unknown.TASK, deep_rope.TASK, preview.TASK, mru.TASK)
+    task.name: task
+    for task in (storm.TASK, unknown.TASK, deep_rope.TASK, preview.TASK, mru.TASK, splash.TASK, landing.TASK)
 }
 """The tasks by name."""
 

@@ -15,6 +15,9 @@ from aframe_env.validation import InvalidValue
 
 Split = Literal["train", "validation", "test"]
 SPLITS: Final[tuple[Split, ...]] = ("train", "validation", "test")
+Measure = Literal["slack_per_hour", "peak_tension", "landing_speed", "lift_offs"]
+"""What may be told of a policy beside its score: how often the rope goes slack, the tension and the landing speed that
+99 of 100 lifts stay below, and how often a load is lifted off the ground again."""
 SEALED: Final = 100
 """First scenarios of a split that its digest seals."""
 _TIMES: Final = (7.0, 31.0, 58.0)
@@ -49,6 +52,8 @@ class Task:
     """s."""
     episode_duration: float = 60.0
     """s."""
+    measures: tuple[Measure, ...] = ()
+    """What is told of a policy beside its score."""
     seeds: Seeds
     left_out: Mapping[Split, frozenset[int]] = field(default_factory=dict)
     """Numbers of a split's draws in which the rope parts whatever the drum does: there is nothing to be scored."""

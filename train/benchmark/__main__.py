@@ -24,6 +24,7 @@ from agents.registry import OPTIMUM, PolicySpec, choose_all
 from train.benchmark import leaderboard, page
 from train.benchmark.ceiling import ceiling_of
 from train.benchmark.leaderboard import LeaderboardRow
+from train.benchmark.measures import measures_of
 from train.evaluate.run import require_period, run_on
 from train.evaluate.statistics import compare_families, family
 from train.shared.cli import parse
@@ -109,7 +110,8 @@ def score(task: Task, specs: list[PolicySpec], options: Options, opened: Run, co
     seed = task.seed(options.split)
     ran = run_on(specs, config, scenarios, console, seed=seed, jobs=opened.jobs, where=options)
     rows = compare_families(ran.entries, ran.still, ran.still.rms * (1.0 - ceiling.reductions))
-    return leaderboard.rows_of(task, ceiling, rows, digests(specs), options.by, opened.command)
+    measures = measures_of(ran.entries, task.measures)
+    return leaderboard.rows_of(task, ceiling, rows, measures, digests(specs), options.by, opened.command)
 
 
 def run(options: Options, console: Console) -> int:

@@ -17,13 +17,15 @@ from rich.progress import Progress
 import aframe_env
 import agents
 from aframe_env.config import TaskConfig
+from aframe_env.scenario import Scenario
 from aframe_env.serialization import strict_converter, structure
 from aframe_env.suite import Split, Task, find_task
 from aframe_env.validation import InvalidValue
 from agents import cards, shipped
 from agents.control.optimum import optimise
-from agents.policy import DrumStill, FloatArray
-from agents.rollout import run
+from agents.policy import FloatArray
+from agents.registry import DRUM_STILL, BuildContext
+from agents.rollout import Episodes, run
 from train.shared.job_store import JobStore, version_of
 from train.shared.jobs import Where, run_jobs
 from train.shared.run_folder import versions, write_json
@@ -51,7 +53,7 @@ class Ceiling:
     method: str
     """How the optimum was found."""
     still: tuple[float, ...]
-    """With the drum left still."""
+    """With the drum left still, but for what a target that moves asks of it."""
     best: tuple[float, ...]
     """With the best drum commands."""
     versions: dict[str, str]
@@ -148,11 +150,16 @@ def _solve(block: _Block) -> _Solved:
             f"task {task.id}: in scenario {block.first + int(np.isinf(best).argmax())} of the split {block.split!r} "
             "the rope parts whatever the drum does: it must be left out"
         )
-    return _Solved(run(DrumStill(), scenarios, config).rms, np.sqrt(best / config.duration))
+    return _Solved(_left_still(scenarios, config).rms, np.sqrt(best / config.duration))
 
 
 def _still(task: Task, split: Split, count: int) -> FloatArray:
-    return run(DrumStill(), task.scenarios(split, count), TaskConfig(**task.arguments)).rms
+    return _left_still(task.scenarios(split, count), TaskConfig(**task.arguments)).rms
+
+
+def _left_still(scenarios: Sequence[Scenario], config: TaskConfig) -> Episodes:
+    policy = DRUM_STILL.policy(BuildContext(scenarios=scenarios, config=config))
+    return run(policy, scenarios, config)
 
 
 def _joined(parts: Sequence[FloatArray]) -> tuple[float, ...]:

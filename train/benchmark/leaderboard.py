@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -56,6 +56,8 @@ class LeaderboardRow:
     """Scenarios in which it does worse than a drum left still, a mean over the seeds."""
     parted: float
     """Scenarios in which the rope parted, likewise."""
+    measures: dict[str, float] = field(default_factory=dict)
+    """What the task tells beside the score, by name; the ceiling has none."""
     sha256: tuple[str, ...] = ()
     """Of the file of each agent, or of the module of somebody's law; none for what the package brings."""
     by: str = ""
@@ -76,6 +78,12 @@ class LeaderboardRow:
         digest = by_id[self.task].digests.get(self.split)
         if self.draws != digest:
             raise InvalidValue(f"{where}: draws = {self.draws!r}: must be {digest!r}, the digest of these scenarios")
+        expected = () if self.policy == OPTIMUM.name else by_id[self.task].measures
+        if sorted(self.measures) != sorted(expected):
+            raise InvalidValue(f"{where}: measures = {self.measures}: must be {', '.join(expected) or 'none'}")
+        for name, value in self.measures.items():
+            if not 0.0 <= value < np.inf:
+                raise InvalidValue(f"{where}: {name} = {value!r}: must be 0 or more")
         known = [each.value for each in Knowledge]
         if self.knows not in known:
             raise InvalidValue(f"{where}: knows = {self.knows!r}: must be one of {', '.join(map(repr, known))}")
@@ -88,9 +96,15 @@ class LeaderboardRow:
 
 
 def rows_of(
-    task: Task, ceiling: Ceiling, rows: Iterable[Row], sha256: Mapping[str, tuple[str, ...]], by: str, command: str
+    task: Task,
+    ceiling: Ceiling,
+    rows: Iterable[Row],
+    measures: Mapping[str, dict[str, float]],
+    sha256: Mapping[str, tuple[str, ...]],
+    by: str,
+    command: str,
 ) -> list[LeaderboardRow]:
-    """Rows of a task: the ceiling, and every policy; ``sha256`` by the policies' names without seeds."""
+    """Rows of a task: the ceiling, and every policy; ``measures`` and ``sha256`` by their names without seeds."""
     same: dict[str, Any] = {
         "task": task.id,
         "split": ceiling.split,
@@ -113,10 +127,13 @@ def rows_of(
         parted=0.0,
         **same,
     )
-    return [best, *(_row(row, sha256.get(family(row.policy), ()), same) for row in rows)]
+    return [
+        best,
+        *(_row(row, measures[family(row.policy)], sha256.get(family(row.policy), ()), same) for row in rows),
+    ]
 
 
-def _row(row: Row, sha256: tuple[str, ...], same: dict[str, Any]) -> LeaderboardRow:
+def _row(row: Row, measures: dict[str, float], sha256: tuple[str, ...], same: dict[str, Any]) -> LeaderboardRow:
     assert row.share is not None
     assert row.share_median is not None
     assert row.share_tail is not None
@@ -130,6 +147,7 @@ def _row(row: Row, sha256: tuple[str, ...], same: dict[str, Any]) -> Leaderboard
         reduction=row.mean,
         worse_than_still=row.worse_than_still,
         parted=row.parted,
+        measures=measures,
         sha256=sha256,
         **same,
     )

@@ -12,10 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from aframe_env.suite import TASKS
+from aframe_env.suite import TASKS, find_task
+from aframe_env.suite.definition import Measure
 from agents.policy import Knowledge
 from agents.registry import OPTIMUM
 from train.benchmark.leaderboard import YARDSTICKS, LeaderboardRow
+from train.benchmark.measures import MEASURES
 from train.evaluate.figure import COLOURS
 from train.evaluate.statistics import Interval
 from train.shared.markdown import table
@@ -34,13 +36,13 @@ HEADINGS: Final = (
     "worst 5 %",
     "reduction",
     "worse than still",
-    "by",
 )
 CAPTION: Final = """\
 Share of the ceiling: a policy's heave reduction, 1 − RMS / RMS(drum still), over that of the best drum commands that
 the winch can follow, the whole future known; mean over the scenarios, median, and mean of the 5 % where it is least. In
 brackets: 95 % bootstrap intervals over the scenarios, and over the seeds, too, where a row stands for several.
-Reduction: the mean heave reduction itself. Worse than still: number of scenarios, a mean over the seeds.
+Reduction: the mean heave reduction itself. Worse than still: number of scenarios, a mean over the seeds. Where the
+target moves, a drum "still" pays out what its way asks for, and nothing else.
 """
 
 
@@ -58,7 +60,9 @@ def page(rows: Sequence[LeaderboardRow]) -> str:
         parts.append(f"## {title}\n")
         if ceiling is not None:
             parts.append(f"The ceiling removes {_percent(ceiling)} of the heave in the mean.\n")
-        parts.append(table(HEADINGS, map(_cells, group)))
+        further = find_task(group[0].task).measures
+        headings = (*HEADINGS, *(MEASURES[measure].heading for measure in further))
+        parts.append(table(headings, (_cells(row, further) for row in group)))
         commands = dict.fromkeys(row.command for row in group)
         parts.append("Made by:\n\n" + "\n".join(f"    {command}" for command in commands) + "\n")
     return "\n".join(parts)
@@ -77,9 +81,10 @@ def _percent(figure: Interval) -> str:
     return f"{figure.value:.1%} [{figure.low:.1%}, {figure.high:.1%}]"
 
 
-def _cells(row: LeaderboardRow) -> tuple[str, ...]:
+def _cells(row: LeaderboardRow, further: Sequence[Measure]) -> tuple[str, ...]:
     shares = map(_percent, (row.share, row.share_median, row.share_worst, row.reduction))
-    return (name_of(row), row.knows, *shares, f"{row.worse_than_still:g}")
+    measures = (f"{row.measures[measure]:.3g}" if measure in row.measures else "" for measure in further)
+    return (name_of(row), row.knows, *shares, f"{row.worse_than_still:g}", *measures)
 
 
 def draw(path: Path, rows: Sequence[LeaderboardRow]) -> None:
