@@ -16,7 +16,8 @@ from aframe_env.neighbours import in_the_way, overwritten
 __version__ = "0.1.0"
 ENV_ID = "AFrameHeave-v0"
 
-_SUITE = {f"AFrameHeave-{name}-v0": {"task": name} for name in ("Storm", "Unknown", "DeepRope", "Preview", "MRU")}
+_TASKS = "Storm", "Unknown", "DeepRope", "Preview", "MRU", "Splash", "Landing"
+_SUITE = {f"AFrameHeave-{name}-v0": {"task": name} for name in _TASKS}
 """Ids of the tasks in ``aframe_env.suite``, which an import has no time to ask."""
 
 for _id, _arguments in {ENV_ID: {}, **_SUITE}.items():

@@ -18,10 +18,12 @@ from aframe_env.suite import SPLITS
 from aframe_env.task import SENSED
 from agents.control.optimum import saturating
 from agents.policy import Knowledge
+from agents.registry import BuildContext, choose_all
 from agents.rollout import HELD_OUT_SEED, run
 
 IDS = [task.id for task in TASKS.values()]
 STORM, UNKNOWN, MRU = TASKS["Storm"], TASKS["Unknown"], TASKS["MRU"]
+SPLASH, LANDING = TASKS["Splash"], TASKS["Landing"]
 
 
 def test_every_task_is_registered_and_nothing_else():
@@ -220,3 +222,37 @@ def test_in_mru_what_is_read_is_not_what_the_pulley_does():
     # A delay or a lead does not mend it, not even the best one in each episode.
     shifted = [np.roll(read, k, axis=0)[10:-10] - rate[10:-10] for k in range(-10, 11)]
     assert np.median(np.min([each.std(axis=0) for each in shifted], axis=0) / rate.std(axis=0)) > 0.2
+
+
+def lowered(task, policies):
+    """Episodes of drums and laws in a dozen scenarios of a task whose target moves."""
+    scenarios, config = task.scenarios("train", 12), TaskConfig(**task.arguments)
+    context = BuildContext(scenarios=scenarios, config=config)
+    return scenarios, [run(spec.policy(context), scenarios, config) for spec in choose_all(policies)]
+
+
+def test_in_splash_loads_go_from_the_air_through_the_surface_and_ropes_go_slack():
+    scenarios, (law, still) = lowered(SPLASH, ["feed-forward + feedback", "drum still"])
+    for scenario in scenarios:
+        change, rate = scenario.target_path.at(60.0)
+        water, half = scenario.water.surface_level, 0.5 * scenario.load.height
+        assert scenario.target_level - half > water  # dry at first, in calm water
+        assert scenario.target_level + change + half < water - 10.0 < water
+        assert change > -20.0 > change + 60.0 * rate  # still on its way at the end
+        assert scenario.weight == pytest.approx(9.81 * scenario.load_mass)
+    assert not still.parted.any()
+    assert still.slack_events.sum() > law.slack_events.sum()
+    # A drum that does not look at the sea still brings the load down.
+    assert (still.rms < 3.0).all()
+
+
+def test_in_landing_loads_come_down_on_the_ground_where_the_target_ends():
+    scenarios, (law, still) = lowered(LANDING, ["feed-forward + feedback", "drum still"])
+    for scenario in scenarios:
+        assert scenario.target_levels[0] == pytest.approx(scenario.bed_level)
+    for episodes in (law, still):
+        assert (episodes.landings >= 1).all()
+        # Each comes off the ground as often as it comes down on it, or once less.
+        assert np.isin(episodes.landings - episodes.lift_offs, (0, 1)).all()
+        assert (episodes.landing_speed > 0.0).all()
+    assert np.quantile(law.landing_speed, 0.5) < np.quantile(still.landing_speed, 0.5)

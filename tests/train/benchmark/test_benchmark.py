@@ -13,17 +13,18 @@ from aframe_env import TASKS, InvalidValue, TaskConfig
 from agents import shipped
 from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.optimum import optimise
-from agents.policy import DrumStill
+from agents.policy import DrumStill, Knowledge
 from agents.registry import BuildContext, choose_all
 from agents.rollout import run
 from train.benchmark import ceiling, leaderboard
 from train.benchmark.__main__ import digests, first_seeds, main
 from train.benchmark.leaderboard import LeaderboardRow
+from train.benchmark.measures import measures_of
 from train.benchmark.page import page
-from train.evaluate.statistics import Interval
+from train.evaluate.statistics import Entry, Interval
 from train.shared.jobs import Where
 
-STORM = TASKS["Storm"]
+STORM, LANDING = TASKS["Storm"], TASKS["Landing"]
 CONFIG = TaskConfig(**STORM.arguments)
 ONE = Where(workers=1)
 LAW = "import numpy as np\n\n\ndef my_law(observation, time):\n    return observation[:, 1] / 0.75\n"
@@ -113,6 +114,34 @@ def test_a_leaderboard_reads_back_and_takes_a_policy_once(tmp_path):
     assert "-150.0% [-200.0%, 0.0%]" in text
 
 
+def test_measures_are_of_all_seeds_together_and_stand_on_the_page(landing_runs):
+    entries, episodes = landing_runs
+    found = measures_of([*entries, replace(entries[0], policy="other")], LANDING.measures)
+    assert list(found) == ["mine", "other"]
+    speeds = np.concatenate([each.landing_speed for each in episodes])
+    assert found["mine"]["landing_speed"] == pytest.approx(np.quantile(speeds, 0.99))
+    assert found["mine"]["lift_offs"] == pytest.approx(np.mean([each.lift_offs.mean() for each in episodes]))
+    assert found["other"]["lift_offs"] == pytest.approx(episodes[0].lift_offs.mean())
+    row = a_row(task=LANDING.id, draws=LANDING.digests["test"], measures=found["mine"])
+    table = page([row]).splitlines()
+    heading, line = (next(each for each in table if each.startswith(start)) for start in ("| policy", "| mine"))
+    assert heading.endswith("| 99 of 100 land within, m/s | lift-offs per lift |")
+    assert line.endswith(f"| {found['mine']['landing_speed']:.3g} | {found['mine']['lift_offs']:.3g} |")
+    assert heading.count("|") == line.count("|")
+
+
+@pytest.fixture(scope="module")
+def landing_runs():
+    """A law and a drum that lowers the load without looking at the sea, as if they were two seeds."""
+    config, scenarios = TaskConfig(**LANDING.arguments), LANDING.scenarios("train", 3)
+    specs = choose_all(["feed-forward + feedback", "drum still"])
+    policies = [spec.policy(BuildContext(scenarios=scenarios, config=config)) for spec in specs]
+    episodes = [run(policy, scenarios, config) for policy in policies]
+    assert (episodes[0].landings > 0).all()
+    entries = [Entry(f"mine, seed {i}", Knowledge.SENSORS, each) for i, each in enumerate(episodes)]
+    return entries, episodes
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
@@ -123,6 +152,19 @@ def test_a_leaderboard_reads_back_and_takes_a_policy_once(tmp_path):
         ({"scenarios": 0}, "row 0: scenarios = 0"),
         ({"scenarios": "many"}, r"row 0: \[scenarios\] 'many': must be of type int"),
         ({"shares": 1.0}, "row 0: unknown key 'shares'"),
+        ({"measures": {"lift_offs": 1.0}}, r"row 0: measures = {'lift_offs': 1.0}: must be none"),
+        (
+            {"task": LANDING.id, "draws": LANDING.digests["test"]},
+            r"row 0: measures = {}: must be landing_speed, lift_offs",
+        ),
+        (
+            {
+                "task": LANDING.id,
+                "draws": LANDING.digests["test"],
+                "measures": {"landing_speed": -0.1, "lift_offs": 1.0},
+            },
+            "row 0: landing_speed = -0.1: must be 0 or more",
+        ),
     ],
 )
 def test_a_row_that_cannot_be_is_refused(tmp_path, change, says):
