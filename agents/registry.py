@@ -30,6 +30,7 @@ from agents.control.inverse_dynamics import InverseDynamics
 from agents.control.lowering import Following
 from agents.control.optimum import CommandSequence, optimise
 from agents.control.predictive import PlanningConfig, PredictiveControl
+from agents.control.set_down import SettingDown, lands
 from agents.drives import map as drive_map
 from agents.drives.map_policy import DriveMapPolicy
 from agents.drives.optimisation import OptimisedDrive, Optimiser
@@ -100,13 +101,19 @@ class PolicySpec:
     """Digest of the file that it comes from, the card's or the module's; empty for what needs none."""
 
     def policy(self, context: BuildContext) -> Policy:
-        """Build the policy; where target or frame move it follows them, unless it is made for that very lift."""
+        """Build the policy; where target or frame move it follows them, unless it is made for that very lift.
+
+        And where the target ends on the seabed it leaves the load there, if it has readings to tell that by.
+        """
         policy = self.build(context)
         moves = any(s.target_path or s.luffing for s in context.scenarios)
         if isinstance(policy, DrivePolicy | CommandSequence) or not moves:
             return policy
         sensors = {Knowledge.SENSORS: context.sensors, Knowledge.NOTHING: context.config.sensors}.get(policy.knows)
-        return Following(policy, sensors)
+        following = Following(policy, sensors)
+        if policy.knows is Knowledge.NOTHING or not any(map(lands, context.scenarios)):
+            return following
+        return SettingDown(following, sensors)
 
 
 def _drum_still(context: BuildContext) -> Policy:

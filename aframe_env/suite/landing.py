@@ -14,6 +14,10 @@ ROPE: Final = 1000.0
 WAY: Final = 6.0
 """From there to the ground, m."""
 WATER: Final = Water()
+GROUND: Final = Seabed(
+    depth=WATER.surface_level - DEEP_CRANE.pulley_position[2] + ROPE + WAY, stiffness=1e7, damping=1e6
+)
+"""Ground that gives way by some centimetres, and from which a load does not bounce by itself."""
 
 TASK: Final = Task(
     name="Landing",
@@ -27,10 +31,7 @@ TASK: Final = Task(
         # The rope's own damping is its material's.
         rope_damping_ratio=0.0,
         crane=DEEP_CRANE,
-        water=replace(
-            WATER,
-            seabed=Seabed(depth=WATER.surface_level - DEEP_CRANE.pulley_position[2] + ROPE + WAY, stiffness=1e7),
-        ),
+        water=replace(WATER, seabed=GROUND),
         load=steel_load(65e3),
         max_rope_speed=(1.2, 2.0),
         max_rope_acceleration=(0.6, 1.2),

@@ -1,0 +1,122 @@
+"""Setting down: a wrapper by which policies that lower a load leave it on the seabed once it is there.
+
+A load that is held at the level of the ground is lifted off it and dropped by every wave. So the target that the policy
+is told goes on into the ground as fast as it came, until the ground bears half of the load; then the drum pays out as
+fast as it can what the rope was stretched by, and what the pulley may rise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+import numpy as np
+
+from aframe_env.scenario import Scenario, TargetPath
+from aframe_env.scenario.sensors import Sensors
+from aframe_env.task import SENSED, STATE
+from agents.control.lowering import Following, PayOut
+from agents.control.regulator import Observation
+from agents.policy import FloatArray, Knowledge
+
+BORNE: Final = 0.5
+"""Share of the load's weight that the ground bears when the load counts as landed."""
+SLACK: Final = 5.0
+"""What is paid out beyond the rope's stretch under the load, m."""
+INTO: Final = 1.0
+"""How far above the ground a way may end that is a way onto it, m."""
+
+
+def lands(scenario: Scenario) -> bool:
+    """Whether the target's way ends on the seabed, coming down."""
+    path = scenario.target_path
+    if path is None or path.corners[-1][1] >= path.corners[-2][1]:
+        return False
+    end = scenario.target_level + path.corners[-1][1]
+    return end - 0.5 * scenario.load.height < scenario.bed_level + INTO
+
+
+def into_the_ground(scenario: Scenario, depth: float) -> Scenario:
+    """The scenario with its target going on by ``depth`` m, as fast as it came, through a seabed that is not there."""
+    path, water = scenario.target_path, scenario.water
+    assert path is not None
+    assert water is not None
+    (before, high), (time, low) = path.corners[-2:]
+    end = time + depth * (time - before) / (high - low), low - depth
+    return replace(
+        scenario,
+        water=replace(water, seabed=None),
+        target_path=TargetPath(corners=(*path.corners[:-1], end), corner_time=path.corner_time),
+    )
+
+
+@dataclass
+class SettingDown:
+    """Let a policy that follows its targets leave those loads on the ground that land on it."""
+
+    policy: Following
+    sensors: Sensors | None = None
+    """Sensors that it acts on; None for the full state."""
+    name: str = field(init=False)
+    knows: Knowledge = field(init=False)
+    _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
+    _told: Sequence[Scenario] = field(init=False, repr=False, default=())
+    """The same as the policy is told them."""
+    _period: float = field(init=False, repr=False, default=0.1)
+    _least: FloatArray = field(init=False, repr=False)
+    """(N,) tension at the pulley below which a load has landed, N; -inf where none does."""
+    _from: FloatArray = field(init=False, repr=False)
+    """(N,) time of arrival, before which a slack rope is no sign of it, s."""
+    _slack: FloatArray = field(init=False, repr=False)
+    """(N,) rad to be paid out then."""
+    _left: FloatArray = field(init=False, repr=False)
+    """(N,) rad still to be paid out; NaN before the load has landed."""
+
+    def __post_init__(self) -> None:
+        self.name, self.knows = f"{self.policy.name}, setting down", self.policy.knows
+
+    def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
+        """Begin N episodes; of the scenarios only what a ``Lift`` has, target and seabed count."""
+        self._scenarios, self._period = scenarios, control_period
+        self._told = [into_the_ground(s, 2.0 * SLACK) if lands(s) else s for s in scenarios]
+        self._least = np.zeros(0)
+        self.policy.reset(self._told, control_period)
+
+    def act(self, observation: Observation, time: float) -> FloatArray:
+        """Drum speed commands (N,) rad/s for observations (N, K)."""
+        columns = [q.name for q in (STATE if self.sensors is None else SENSED)]
+        tension = observation[:, columns.index("rope_tension")].astype(np.float64)
+        if not len(self._least):
+            self._start(tension)
+        landed = np.isnan(self._left) & (tension < self._least) & (time >= self._from)
+        self._left[landed] = self._slack[landed]
+        then = time - (0.0 if self.sensors is None else self.sensors.delay)
+        seen = observation.copy()
+        seen[:, columns.index("depth_error")] += self._above(then)
+        command = self.policy.act(seen, time)
+        most = np.array([scenario.crane.winch.max_speed for scenario in self._scenarios])
+        leaving = np.minimum(most, self._left / self._period)
+        self._left -= self._period * leaving
+        return np.asarray(np.where(np.isnan(leaving), command, leaving))
+
+    def _above(self, time: float) -> FloatArray:
+        """(N,) m that the targets are above those that the policy is told."""
+        true, told = (
+            np.array([0.0 if s.target_path is None else s.target_path.at(time)[0] for s in scenarios])
+            for scenarios in (self._scenarios, self._told)
+        )
+        return np.asarray(true - told)
+
+    def _start(self, tension: FloatArray) -> None:
+        plans = [PayOut.weighed(s, each) for s, each in zip(self._scenarios, tension.tolist(), strict=True)]
+        ends = [plan.at(plan.scenario.target_path.duration if plan.scenario.target_path else 0.0) for plan in plans]
+        weights = np.array([plan.weight for plan in plans])
+        down = np.array([lands(scenario) for scenario in self._scenarios])
+        self._from = np.array([s.target_path.corners[-1][0] if s.target_path else 0.0 for s in self._scenarios])
+        self._least = np.where(down, np.array([end.tension for end in ends]) - BORNE * weights, -np.inf)
+        stiffness = np.array([scenario.crane.rope.axial_stiffness for scenario in self._scenarios])
+        stretch = weights * np.array([end.length for end in ends]) / stiffness
+        radius = [s.crane.drum_radius(end.length) for s, end in zip(self._scenarios, ends, strict=True)]
+        self._slack = (stretch + SLACK) / np.array(radius)
+        self._left = np.full(len(tension), np.nan)
