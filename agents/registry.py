@@ -148,12 +148,16 @@ def _law(make: Callable[[Sensors, ExpectedWaves], Policy]) -> PolicySpec:
 
 def _predictive(name: str, sensed: bool, adapts: bool = False) -> PolicySpec:
     def build(context: BuildContext) -> Policy:
-        sensors, horizon = context.sensors if sensed else None, PlanningConfig.horizon
+        sensors, horizon, light = context.sensors if sensed else None, PlanningConfig.horizon, context.nominal.is_light
         if sensors is not None and sensors.preview is not None:
             horizon = PREVIEW_HORIZON
-        elif not context.nominal.is_light:
+        elif not light:
             horizon = SLOW_HORIZON
-        return PredictiveControl(PlanningConfig(sensors=sensors, horizon=horizon, waves=context.waves, adapts=adapts))
+        return PredictiveControl(
+            PlanningConfig(
+                sensors=sensors, horizon=horizon, waves=context.waves, adapts=adapts, chains=sensed and not light
+            )
+        )
 
     return PolicySpec(name, build)
 
