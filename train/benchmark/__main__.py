@@ -12,7 +12,7 @@ import sys
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
 from rich.console import Console
 from rich.progress import Progress
@@ -25,12 +25,32 @@ from train.benchmark import leaderboard, page
 from train.benchmark.ceiling import ceiling_of
 from train.benchmark.leaderboard import LeaderboardRow
 from train.benchmark.measures import measures_of
+from train.benchmark.specialists import specialists
 from train.evaluate.run import require_period, run_on
 from train.evaluate.statistics import compare_families, family
 from train.shared.cli import parse
 from train.shared.console import PlainConsole
 from train.shared.jobs import Where
 from train.shared.run_folder import Run, RunOptions, open_jobs, user_errors
+
+POLICIES: Final = (
+    "output zero on sensors",
+    "feed-forward + feedback",
+    "predictive control",
+    "adaptive predictive control",
+    "drive-map",
+    "ppo-sensors",
+    "sac-sensors",
+    "predictive-ppo-sensors",
+    "output zero",
+    "feed-forward + feedback (state)",
+    "predictive control (state)",
+    "drive-map:state",
+    "ppo",
+    "sac",
+    "predictive-ppo",
+    "inverse dynamics",
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,25 +59,9 @@ class Options(RunOptions, Where):
 
     tasks: tuple[str, ...] = tuple(TASKS)
     """Tasks of the suite, by name."""
-    policies: tuple[str, ...] = (
-        "output zero on sensors",
-        "feed-forward + feedback",
-        "predictive control",
-        "adaptive predictive control",
-        "drive-map",
-        "ppo-sensors",
-        "sac-sensors",
-        "predictive-ppo-sensors",
-        "output zero",
-        "feed-forward + feedback (state)",
-        "predictive control (state)",
-        "drive-map:state",
-        "ppo",
-        "sac",
-        "predictive-ppo",
-        "inverse dynamics",
-    )
-    """Names, folders of agents or module:function, as in train.evaluate; drum still and ceiling are always there."""
+    policies: tuple[str, ...] = POLICIES
+    """Names, folders of agents or module:function, as in train.evaluate; drum still and ceiling are always there. By
+    default the laws, the agents that were trained on the nominal task, and those that were on the task at hand."""
     seeds: int | None = None
     """Of agents that differ in their seed alone the first so many; by default all."""
     split: Literal["test", "validation"] = "test"
@@ -77,6 +81,12 @@ class Options(RunOptions, Where):
             raise InvalidValue(f"tasks = (): must be one or more of {', '.join(map(repr, TASKS))}")
         for name in self.tasks:
             find_task(name)
+
+
+def chosen_for(task: Task, options: Options) -> list[PolicySpec]:
+    """Policies that are scored on a task."""
+    own = specialists(task) if options.policies == POLICIES else []
+    return first_seeds(choose_all([*options.policies, *own]), options.seeds)
 
 
 def first_seeds(specs: list[PolicySpec], count: int | None) -> list[PolicySpec]:
@@ -116,16 +126,16 @@ def score(task: Task, specs: list[PolicySpec], options: Options, opened: Run, co
 
 def run(options: Options, console: Console) -> int:
     """Compute, write, draw; return the exit status."""
-    specs = first_seeds(choose_all(options.policies), options.seeds)
-    tasks = [find_task(name) for name in options.tasks]
+    chosen = [(task := find_task(name), chosen_for(task, options)) for name in options.tasks]
     board = options.leaderboard
     if board is not None and not options.overwrite:
-        leaderboard.require_room(board, tasks, options.split, options.scenarios, digests(specs), options.by)
+        for task, specs in chosen:
+            leaderboard.require_room(board, [task], options.split, options.scenarios, digests(specs), options.by)
     opened = open_jobs(options, "train.benchmark", page.PAGE)
     board = board or opened.folder / leaderboard.NAME
     leaderboard.read(board)  # one that cannot be added to is refused before anything is computed
     try:
-        rows = [row for task in tasks for row in score(task, specs, options, opened, console)]
+        rows = [row for task, specs in chosen for row in score(task, specs, options, opened, console)]
     except KeyboardInterrupt:
         console.print("interrupted: what is finished is kept; the same command goes on from there")
         return 130

@@ -25,6 +25,7 @@ from aframe_env.suite import TASKS, Task, find_task
 from aframe_env.validation import require_integer
 from agents.registry import DRUM_STILL, OPTIMUM, BuildContext, PolicySpec, choose_all
 from agents.rollout import Episodes, run
+from train.benchmark.specialists import specialists
 from train.evaluate.figure import COLOURS, GREY
 from train.evaluate.run import observation_of
 from train.shared.cli import parse
@@ -32,16 +33,9 @@ from train.shared.console import PlainConsole
 from train.shared.run_folder import user_errors, write_atomically
 
 PICTURE: Final = "scene.png"
-SHOWN: Final[Mapping[str, tuple[str, ...]]] = {
-    "Storm": ("adaptive predictive control", "apg-storm"),
-    "Unknown": ("adaptive predictive control", "apg-unknown"),
-    "DeepRope": ("adaptive predictive control",),
-    "Preview": ("adaptive predictive control", "apg-preview"),
-    "MRU": ("adaptive predictive control",),
-    "Splash": ("feed-forward + feedback",),
-    "Landing": ("adaptive predictive control",),
-}
-"""Best hand-written law on sensors of each task, and best agent where one was trained on it."""
+LAWS: Final[Mapping[str, str]] = {"Splash": "feed-forward + feedback"}
+LAW: Final = "adaptive predictive control"
+"""Best hand-written law on sensors of these tasks, and of all others."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,7 +74,7 @@ class Scene:
 def find_scene(task: Task, count: int) -> Scene:
     """Choose a task's scene among so many validation scenarios, and run everybody in it."""
     config, scenarios = TaskConfig(**task.arguments), task.scenarios("validation", count)
-    specs = choose_all(SHOWN[task.name])
+    specs = choose_all([LAWS.get(task.name, LAW), *specialists(task, "sensors")])
     still, law, best = (_run(spec, config, scenarios, task) for spec in (DRUM_STILL, specs[0], OPTIMUM))
     order = np.argsort((still.rms - law.rms) / (still.rms - best.rms))
     number = int(order[len(order) // 4])

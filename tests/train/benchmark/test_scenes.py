@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -9,8 +11,9 @@ from PIL import Image
 from aframe_env import TASKS, TaskConfig
 from agents import shipped
 from agents.control.optimum import optimise
-from agents.registry import choose_all
-from train.benchmark.scenes import SHOWN, draw, find_scene
+from train.benchmark.__main__ import Options, chosen_for
+from train.benchmark.scenes import draw, find_scene
+from train.benchmark.specialists import specialists
 
 
 def test_a_scene_is_a_hard_scenario_and_no_freak(tmp_path):
@@ -30,9 +33,15 @@ def test_a_scene_is_a_hard_scenario_and_no_freak(tmp_path):
         assert min(picture.size) > 600
 
 
-def test_every_task_has_a_law_and_the_agents_that_were_trained_on_it():
-    assert set(SHOWN) == set(TASKS)
-    trained = {name: text for texts in SHOWN.values() for text in texts for name in [text] if text in shipped.RECURRENT}
-    assert set(trained) == {name for name in shipped.RECURRENT if "state" not in name}
-    for texts in SHOWN.values():
-        assert choose_all(texts)
+def test_an_agent_is_the_specialist_of_the_task_that_it_was_trained_on():
+    found = {name: set(specialists(task)) for name, task in TASKS.items()}
+    assert set().union(*found.values()) == set(shipped.RECURRENT)
+    assert sum(map(len, found.values())) == len(shipped.RECURRENT)
+    assert found["Storm"] == {"apg-storm", "apg-state-storm"}
+    assert specialists(TASKS["Storm"], "state") == ["apg-state-storm"]
+    ours = [spec.text for spec in chosen_for(TASKS["Storm"], Options())]
+    assert {"apg-storm", "apg-state-storm", "ppo-sensors", "predictive control"} <= {Path(text).name for text in ours}
+    assert "apg-unknown" not in ours
+    assert [spec.text for spec in chosen_for(TASKS["Storm"], Options(policies=("inverse dynamics",)))] == [
+        "inverse dynamics"
+    ]
