@@ -81,7 +81,16 @@ class MotionUnit:
 
         ``exponent`` s in 1/s; iω for a steady wave.
         """
-        return 1.0 - _slow_share(exponent, 2.0 * math.pi / within(self.heave_period, 0.5), self.heave_damping)
+        return 1.0 - _slow_share(exponent, self._frequency, self.heave_damping)
+
+    @property
+    def exponent(self) -> complex:
+        """λ in 1/s: what is left of a change goes with Re(c exp(λ t)), as far as the filter is known."""
+        return self._frequency * complex(-self.heave_damping, math.sqrt(1.0 - self.heave_damping**2))
+
+    @property
+    def _frequency(self) -> float:
+        return 2.0 * math.pi / within(self.heave_period, 0.5)
 
 
 def _slow_share(exponent: ComplexArray, frequency: float, damping: float) -> ComplexArray:

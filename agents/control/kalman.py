@@ -85,9 +85,9 @@ class Schedule:
     """Gains of K control steps for M kinds of sea; those of the last period of the depth sensor repeat from then on."""
 
     rate: ComplexArray
-    """(K, M, bands + 1) gains of a reading of the heave rate, on the oscillators and on the offset."""
+    """(K, M, parts + 1) gains of a reading of the heave rate, on what ``parts_of`` has and on the offset."""
     depth: ComplexArray
-    """(K, M, bands + 1) gains of a reading of the depth; zero where there is none."""
+    """(K, M, parts + 1) gains of a reading of the depth; zero where there is none."""
     spread: FloatArray
     """(K, M) variance of a reading of the heave rate about what is foretold of it, m²/s²."""
     hold: int
@@ -103,28 +103,26 @@ class Schedule:
 def schedule(bank: WaveBank, period: float, hold: int) -> Schedule:
     """Gains of the Kalman filters by the recursion of their covariances over 60 s."""
     steps = hold * round(60.0 / period / hold) + hold
-    exponent = exponents(bank)
     variances = np.array(bank.waves.variances)
     (kinds, bands), build_up = variances.shape, bank.waves.build_up
-    transition = np.exp(exponent * period)
-    rate = np.append(np.tile([1.0, 0.0], bands), 0.0)
-    if bank.unit is not None:
-        rate[:-1] = np.stack([passed(bank).real, -passed(bank).imag], axis=1).ravel()
-    inverse = 1.0 / exponent
+    exponent, weight, inverse = parts_of(bank)
+    transition, parts = np.exp(exponent * period), 2 * len(exponent) + 1
+    rate = np.append(np.stack([weight.real, -weight.imag], axis=1).ravel(), 0.0)
     depth = np.append(np.stack([inverse.real, -inverse.imag], axis=1).ravel(), 1.0)
     # It is the rates that are stirred: a displacement does not jump.
     rising = period * np.arange(steps) < build_up
     grow = np.where(rising, 2.0 * period / build_up if build_up else 0.0, -np.expm1(-2.0 * bank.damping * period))
     # A ship that moves already has all of it, in both parts of every oscillator.
-    start = np.zeros((kinds, 2 * bands + 1))
-    start[:, :-1] = 0.0 if build_up else np.repeat(variances, 2, axis=1)
+    start = np.zeros((kinds, parts))
+    start[:, : 2 * bands] = 0.0 if build_up else np.repeat(variances, 2, axis=1)
     start[:, -1] = 1e-6
-    gains, spread = np.zeros((2, kinds, steps, 2 * bands + 1)), np.ones((kinds, steps))
+    gains, spread = np.zeros((2, kinds, steps, parts)), np.ones((kinds, steps))
     for kind in range(kinds):
         _kernels().recurse(
             start[kind],
             transition,
             2.0 * variances[kind],
+            stirred(bank),
             grow,
             bank.offset_drift * period,
             np.stack([rate, depth]),
@@ -144,10 +142,31 @@ def exponents(bank: WaveBank) -> ComplexArray:
     return np.asarray(-bank.damping + 1j * np.array(bank.waves.frequency), dtype=np.complex128)
 
 
-def passed(bank: WaveBank) -> ComplexArray:
-    """Shares (bands,) of the oscillators' heave rates that are read: all of them, but for the unit's heave filter."""
+def parts_of(bank: WaveBank) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Exponents of what a bank follows, and by what it is multiplied to be read as heave rate, and as heave.
+
+    The oscillators; and with a motion reference unit what its heave filter has left of their changes, which is read
+    beside their shares that it lets pass, and is no heave.
+    """
     exponent = exponents(bank)
-    return np.ones_like(exponent) if bank.unit is None else bank.unit.passed(exponent)
+    if bank.unit is None:
+        return exponent, np.ones_like(exponent), 1.0 / exponent
+    left = np.array([bank.unit.exponent])
+    weight = np.append(bank.unit.passed(exponent), 1.0)
+    return np.append(exponent, left), weight, np.append(1.0 / exponent, 0.0)
+
+
+def stirred(bank: WaveBank) -> FloatArray:
+    """What a jump of an oscillator's rate leaves in the unit's heave filter, for each, as real and imaginary part.
+
+    (bands, 2); (0, 2) without a unit. What the filter takes out, z - y of a heave z, jumps no more than its rate does.
+    """
+    if bank.unit is None:
+        return np.zeros((0, 2))
+    exponent, left = exponents(bank), bank.unit.exponent
+    slow = 1.0 - bank.unit.passed(exponent)
+    rate, place = slow.real, (slow / exponent).real
+    return np.stack([rate, (place * abs(left) ** 2 - rate * left.real) / left.imag], axis=1)
 
 
 class WaveFilter:
@@ -157,8 +176,8 @@ class WaveFilter:
         """``hold``: control steps between two readings of the depth."""
         self._schedule = schedule(bank, control_period, hold)
         self._exponent = exponents(bank)
-        self._transition = np.append(np.exp(self._exponent * control_period), 1.0)
-        self._passed = passed(bank)
+        followed, self._weight, self._inverse = parts_of(bank)
+        self._transition = np.append(np.exp(followed * control_period), 1.0)
         self.finds = bank.finds
         """Whether ``find`` is to follow on ``start``."""
         kinds, parts = self._schedule.rate.shape[1:]
@@ -190,9 +209,9 @@ class WaveFilter:
 
     def find(self, heave_rate: FloatArray, depth: FloatArray, rows: Rows = ALL) -> None:
         """Take the readings (n,) of heave rate [m/s] and heave by the depth [m] at the start of these rows."""
-        first, turned, state = self._schedule, 1.0 / self._exponent, self._of_kinds[rows]
+        first, state = self._schedule, self._of_kinds[rows]
         state += heave_rate[:, None, None] * first.rate[0]
-        heave = (state[..., :-1] * turned).real.sum(axis=2) + state[..., -1].real
+        heave = (state[..., :-1] * self._inverse).real.sum(axis=2) + state[..., -1].real
         state += (depth[:, None] - heave)[..., None] * first.depth[0]
         self._of_kinds[rows], self._state[rows] = state, state.mean(axis=1)
 
@@ -204,7 +223,7 @@ class WaveFilter:
         _kernels().advance(
             self._of_kinds,
             self._transition,
-            self._passed,
+            self._weight,
             heave_rate,
             heard,
             self._schedule.rate,
@@ -222,7 +241,7 @@ class WaveFilter:
         self.missed = np.where(self._step % self._schedule.hold == 0, innovation, self.missed)
         _kernels().correct(
             self._of_kinds,
-            1.0 / self._exponent,
+            self._inverse,
             innovation,
             self._schedule.depth,
             self._schedule.index(self._step),
@@ -244,7 +263,11 @@ class WaveFilter:
 
         Σ Re(z exp(λ t)) is the heave ``t`` s after it, about the mean of the waves.
         """
-        return np.asarray(self._state[:, :-1] / self._exponent)
+        return np.asarray(self._waves / self._exponent)
+
+    @property
+    def _waves(self) -> ComplexArray:
+        return self._state[:, : len(self._exponent)]
 
     def rate(self, times: FloatArray) -> FloatArray:
         """Velocity (T, N) m/s of the pulley, ``times`` s after the latest reading's moment of measurement.
@@ -267,7 +290,7 @@ class WaveFilter:
 
     def _sum(self, factors: ComplexArray) -> FloatArray:
         # Row by row in the same order, whatever the batch: a sum, not a matrix product.
-        return np.asarray((factors * self._state[None, :, :-1]).real.sum(axis=2))
+        return np.asarray((factors * self._waves[None]).real.sum(axis=2))
 
 
 class _Kernels(NamedTuple):
@@ -308,8 +331,11 @@ def _weigh(misfit: FloatArray, log_spread: FloatArray, readings: int, probabilit
 @cache
 def _kernels() -> _Kernels:
     @kernel
-    def recurse(start, transition, stir, grow, drift, rows, noise, hold, first, gains, spread):  # type: ignore[no-untyped-def]
+    def recurse(  # type: ignore[no-untyped-def]
+        start, transition, stir, leaves, grow, drift, rows, noise, hold, first, gains, spread
+    ):
         parts, bands = start.shape[0], transition.shape[0]
+        left = parts - 3  # of the unit's heave filter, where there is one
         covariance = np.diag(start)
         cross = np.empty(parts)
         for step in range(first, spread.shape[0]):
@@ -324,8 +350,14 @@ def _kernels() -> _Kernels:
                     c, s = transition[i].real, transition[i].imag
                     x, y = covariance[j, 2 * i], covariance[j, 2 * i + 1]
                     covariance[j, 2 * i], covariance[j, 2 * i + 1] = c * x - s * y, s * x + c * y
-            for i in range(bands):
+            for i in range(stir.shape[0]):
                 covariance[2 * i, 2 * i] += stir[i] * grow[step]
+            for i in range(leaves.shape[0]):
+                for j in range(2):
+                    covariance[2 * i, left + j] += leaves[i, j] * stir[i] * grow[step]
+                    covariance[left + j, 2 * i] += leaves[i, j] * stir[i] * grow[step]
+                    for k in range(2):
+                        covariance[left + j, left + k] += leaves[i, j] * leaves[i, k] * stir[i] * grow[step]
             covariance[-1, -1] += drift
             for sensor in range(2):
                 if sensor == 1 and step % hold != 0:
@@ -347,7 +379,7 @@ def _kernels() -> _Kernels:
     def advance(  # type: ignore[no-untyped-def]
         of_kinds,
         transition,
-        passed,
+        weight,
         reading,
         heard,
         gain,
@@ -367,7 +399,7 @@ def _kernels() -> _Kernels:
                 for part in range(parts):
                     of_kinds[row, kind, part] *= transition[part]
                     if part < parts - 1:
-                        deviation -= (passed[part] * of_kinds[row, kind, part]).real
+                        deviation -= (weight[part] * of_kinds[row, kind, part]).real
                 if not heard[row]:
                     continue
                 for part in range(parts):
