@@ -27,7 +27,7 @@ from agents import shipped
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.feedback import Feedback
 from agents.control.inverse_dynamics import InverseDynamics
-from agents.control.lowering import Following
+from agents.control.lowering import BLIND, Following
 from agents.control.optimum import CommandSequence, optimise
 from agents.control.predictive import PlanningConfig, PredictiveControl
 from agents.control.set_down import SettingDown, lands
@@ -109,9 +109,10 @@ class PolicySpec:
         moves = any(s.target_path or s.luffing for s in context.scenarios)
         if isinstance(policy, DrivePolicy | CommandSequence) or not moves:
             return policy
-        sensors = {Knowledge.SENSORS: context.sensors, Knowledge.NOTHING: context.config.sensors}.get(policy.knows)
+        blind = policy.knows in BLIND
+        sensors = context.config.sensors if blind else context.sensors if policy.knows is Knowledge.SENSORS else None
         following = Following(policy, sensors)
-        if policy.knows is Knowledge.NOTHING or not any(map(lands, context.scenarios)):
+        if blind or not any(map(lands, context.scenarios)):
             return following
         return SettingDown(following, sensors)
 

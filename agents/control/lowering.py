@@ -26,6 +26,8 @@ from agents.policy import FloatArray, Knowledge, Policy
 
 RETUNE_AT: Final = 0.05
 """Change of a rope's length, as a share of it, after which a policy is tuned to it anew."""
+BLIND: Final = (Knowledge.NOTHING, Knowledge.CLOCK)
+"""What policies know that look at no readings, and so may be put beside any."""
 
 
 @runtime_checkable
@@ -115,7 +117,7 @@ class Following:
 
     policy: Policy
     sensors: Sensors | None = None
-    """Sensors that it acts on, for their delay; None for the full state."""
+    """Sensors that it acts on, for their delay, or that are put before a blind one; None for the full state."""
     name: str = field(init=False)
     knows: Knowledge = field(init=False)
     _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
@@ -137,8 +139,7 @@ class Following:
 
     def __post_init__(self) -> None:
         self.name, self.knows = f"{self.policy.name}, following", self.policy.knows
-        seen = self.knows is not Knowledge.NOTHING  # which may be put beside either
-        if seen and (self.knows is Knowledge.SENSORS) != (self.sensors is not None):
+        if self.knows not in BLIND and (self.knows is Knowledge.SENSORS) != (self.sensors is not None):
             raise InvalidValue(
                 f"sensors = {'None' if self.sensors is None else 'given'}: {self.policy.name} knows "
                 f"{self.knows.value}: must be given to a policy on sensors, and to no other"

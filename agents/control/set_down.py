@@ -13,42 +13,72 @@ from typing import Final
 
 import numpy as np
 
-from aframe_env.scenario import Scenario, TargetPath
+from aframe_env.scenario import Crane, Scenario, TargetPath
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
-from agents.control.lowering import Following, PayOut
+from aframe_env.validation import InvalidValue
+from agents.control.lowering import BLIND, Following, PayOut
 from agents.control.regulator import Observation
 from agents.policy import FloatArray, Knowledge
 
 BORNE: Final = 0.5
 """Share of the load's weight that the ground bears when the load counts as landed."""
 SLACK: Final = 5.0
-"""What is paid out beyond the rope's stretch under the load, m."""
+"""What is paid out beyond the rope's stretch under the load, and beyond what a frame that luffs may raise it by, m."""
 INTO: Final = 1.0
 """How far above the ground a way may end that is a way onto it, m."""
+SLOWEST: Final = 0.1
+"""Least speed at which the target goes on into the ground, m/s: the last centimetres may come more slowly."""
+STRETCH: Final = 0.1
+"""Share of its length that half of the load stretches no rope by."""
+
+
+def way_down(path: TargetPath) -> tuple[tuple[float, float], ...]:
+    """Corners of a target's way up to the one at which it has come to rest."""
+    corners = path.corners
+    while len(corners) > 1 and corners[-1][1] == corners[-2][1]:
+        corners = corners[:-1]
+    return corners
 
 
 def lands(scenario: Scenario) -> bool:
     """Whether the target's way ends on the seabed, coming down."""
-    path = scenario.target_path
-    if path is None or path.corners[-1][1] >= path.corners[-2][1]:
+    if scenario.target_path is None:
         return False
-    end = scenario.target_level + path.corners[-1][1]
+    corners = way_down(scenario.target_path)
+    if len(corners) == 1 or corners[-1][1] > corners[-2][1]:
+        return False
+    end = scenario.target_level + corners[-1][1]
     return end - 0.5 * scenario.load.height < scenario.bed_level + INTO
 
 
 def into_the_ground(scenario: Scenario, depth: float) -> Scenario:
-    """The scenario with its target going on by ``depth`` m, as fast as it came, through a seabed that is not there."""
-    path, water = scenario.target_path, scenario.water
+    """The scenario with its target going on by ``depth`` m, as fast as it came, through a seabed that is not there.
+
+    By a rope that does not part, and no further than it reaches.
+    """
+    path, water, crane = scenario.target_path, scenario.water, scenario.crane
     assert path is not None
     assert water is not None
-    (before, high), (time, low) = path.corners[-2:]
-    end = time + depth * (time - before) / (high - low), low - depth
+    corners = way_down(path)
+    (before, high), (time, low) = corners[-2:]
+    reach = crane.winch.max_rope_length - max(_to_level_zero(each) for each in scenario.cranes)
+    depth = min(depth, reach + scenario.target_level + low)
+    if depth > 0.0:
+        speed = (high - low) / (time - before)
+        kept = corners[:-1] if speed >= SLOWEST else corners
+        corners = (*kept, (time + depth / max(speed, SLOWEST), low - depth))
     return replace(
         scenario,
+        crane=replace(crane, rope=replace(crane.rope, breaking_load=1e12)),
         water=replace(water, seabed=None),
-        target_path=TargetPath(corners=(*path.corners[:-1], end), corner_time=path.corner_time),
+        target_path=TargetPath(corners=corners, corner_time=path.corner_time),
     )
+
+
+def _to_level_zero(crane: Crane) -> float:
+    """Way of the rope from the drum over the pulley to a load at level 0, m."""
+    return crane.drum_to_pulley + crane.pulley_position[2]
 
 
 @dataclass
@@ -75,11 +105,16 @@ class SettingDown:
 
     def __post_init__(self) -> None:
         self.name, self.knows = f"{self.policy.name}, setting down", self.policy.knows
+        if self.knows in BLIND:
+            raise InvalidValue(
+                f"policy = {self.policy.name!r}: knows {self.knows.value}: must have readings, which tell that a load "
+                "has landed"
+            )
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes; of the scenarios only what a ``Lift`` has, target and seabed count."""
         self._scenarios, self._period = scenarios, control_period
-        self._told = [into_the_ground(s, 2.0 * SLACK) if lands(s) else s for s in scenarios]
+        self._told = [into_the_ground(s, 2.0 * SLACK + STRETCH * s.rope_length) if lands(s) else s for s in scenarios]
         self._least = np.zeros(0)
         self.policy.reset(self._told, control_period)
 
@@ -113,10 +148,12 @@ class SettingDown:
         ends = [plan.at(plan.scenario.target_path.duration if plan.scenario.target_path else 0.0) for plan in plans]
         weights = np.array([plan.weight for plan in plans])
         down = np.array([lands(scenario) for scenario in self._scenarios])
-        self._from = np.array([s.target_path.corners[-1][0] if s.target_path else 0.0 for s in self._scenarios])
+        self._from = np.array([way_down(s.target_path)[-1][0] if s.target_path else 0.0 for s in self._scenarios])
         self._least = np.where(down, np.array([end.tension for end in ends]) - BORNE * weights, -np.inf)
         stiffness = np.array([scenario.crane.rope.axial_stiffness for scenario in self._scenarios])
         stretch = weights * np.array([end.length for end in ends]) / stiffness
+        ways = [[_to_level_zero(crane) for crane in scenario.cranes] for scenario in self._scenarios]
+        rise = np.array([max(way) - min(way) for way in ways])
         radius = [s.crane.drum_radius(end.length) for s, end in zip(self._scenarios, ends, strict=True)]
-        self._slack = (stretch + SLACK) / np.array(radius)
+        self._slack = (stretch + SLACK + rise) / np.array(radius)
         self._left = np.full(len(tension), np.nan)

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aframe_env import TASKS, HarmonicMotion, Scenario, Sensors, TargetPath, TaskConfig
+from aframe_env import TASKS, HarmonicMotion, InvalidValue, Luffing, Scenario, Sensors, TargetPath, TaskConfig
 from agents.control.feedback import Feedback
 from agents.control.lowering import Following
 from agents.control.set_down import SettingDown, into_the_ground, lands
-from agents.policy import Policy
+from agents.policy import DrumStill, Policy
 from agents.registry import BuildContext, choose_all
 from agents.rollout import run
 
@@ -73,6 +73,76 @@ def test_only_a_way_down_to_the_ground_lands() -> None:
     for time in (0.0, 14.0, 30.0, scenario.target_path.duration - 2.0):
         assert told.target_path.at(time) == pytest.approx(scenario.target_path.at(time))
     assert told.target_path.at(1e3) == pytest.approx((scenario.target_path.at(1e3)[0] - 3.0, 0.0))
+
+
+def down_by(*corners: tuple[float, float]) -> Scenario:
+    return replace(scenarios(1)[0], target_path=TargetPath(corners=corners))
+
+
+def test_a_way_that_holds_at_its_end_lands_as_if_it_did_not() -> None:
+    (scenario,) = scenarios(1)
+    assert scenario.target_path is not None
+    corners = scenario.target_path.corners
+    held = down_by(*corners, (50.0, corners[-1][1]), (55.0, corners[-1][1]))
+    assert lands(held)
+    assert into_the_ground(held, 3.0) == into_the_ground(scenario, 3.0)
+    assert not lands(down_by((15.0, 0.0), (20.0, 0.0)))
+
+
+def test_a_way_that_ends_slowly_goes_on_into_the_ground_less_slowly() -> None:
+    for slow in (1e-3, 1e-6):
+        scenario = down_by((15.0, 0.0), (34.0, slow - 6.0), (40.0, -6.0))
+        assert scenario.target_path is not None
+        told = into_the_ground(scenario, 3.0).target_path
+        assert told is not None
+        for time in (20.0, 36.0, 38.9):
+            assert told.at(time) == pytest.approx(scenario.target_path.at(time), abs=1e-9)
+        assert told.at(50.0) == pytest.approx((-7.0, -0.1))
+        assert told.at(1e3) == pytest.approx((-9.0, 0.0))
+
+
+def test_it_goes_into_the_ground_no_further_than_the_rope_reaches_and_by_one_that_does_not_part() -> None:
+    (scenario,) = scenarios(1)
+    crane = scenario.crane
+    # 10 m of rope are left at the ground, of which its stretch takes some, and 100 N of what it bears.
+    winch = replace(crane.winch, max_rope_length=scenario.free_length + 16.0)
+    most = scenario.hanging_weight + 6.0 * scenario.rope_weight + 100.0
+    ends = replace(scenario, crane=replace(crane, winch=winch, rope=replace(crane.rope, breaking_load=most)))
+    told = into_the_ground(ends, 100.0)
+    assert -16.0 < told.target_levels[0] - scenario.target_level < -12.0
+    none = replace(winch, max_rope_length=scenario.free_length + 6.5)
+    told = into_the_ground(replace(scenario, crane=replace(crane, winch=none)), 100.0)
+    assert told.target_levels == scenario.target_levels
+
+
+def test_loads_on_soft_ropes_and_under_frames_that_luff_are_left_on_the_ground() -> None:
+    (calm,) = (replace(s, motion=HarmonicMotion(harmonics=())) for s in scenarios(1))
+    crane = calm.crane
+    soft = replace(crane, rope=replace(crane.rope, axial_stiffness=1.5e7))  # stretched by 25 m and more
+    out = replace(crane, frame=replace(crane.frame, luffing_angle=-1.2))
+    luffing = Luffing.swing(-1.2, 0.0, 60.0, 80.0)
+    target = out.pulley_position[2] - crane.pulley_position[2] + calm.target_level
+    assert calm.water is not None
+    assert calm.water.seabed is not None
+    bed = replace(calm.water.seabed, depth=calm.water.seabed.depth - (target - calm.target_level))
+    luffed = replace(calm, crane=out, luffing=luffing, target_level=target, water=replace(calm.water, seabed=bed))
+    ways = [each.pulley_position[2] + each.drum_to_pulley for each in luffed.cranes]
+    assert max(ways) - min(ways) > 9.0  # more than is paid out of it below a frame that holds
+    policy = SettingDown(Following(Feedback(SENSORS), SENSORS), SENSORS)
+    episodes = run(policy, [replace(calm, crane=soft), luffed], CONFIG, episode_duration=160.0)
+    assert (episodes.landings - episodes.lift_offs == 1).all()
+    assert (episodes.lift_offs <= 1).all()
+    np.testing.assert_allclose(episodes.tension[:, -1], calm.rope_weight * calm.lengths[0], rtol=0.1)
+
+
+def test_nobody_without_readings_sets_a_load_down() -> None:
+    with pytest.raises(InvalidValue, match="policy = 'drum still, following': knows nothing: must have readings"):
+        SettingDown(Following(DrumStill()))
+    (spec,) = choose_all(["drive-map:clock"])
+    policy = spec.policy(BuildContext(scenarios=scenarios(1), config=CONFIG))
+    assert isinstance(policy, Following)
+    # It runs on the task's own observation, of which it reads the drum's encoder.
+    assert np.isfinite(run(policy, scenarios(1), CONFIG, episode_duration=2.0).rms).all()
 
 
 @pytest.mark.parametrize(
