@@ -18,6 +18,7 @@ from rich.console import Console
 
 from aframe_env.validation import InvalidValue
 from agents.learned.recurrent import CARD, WEIGHTS, RecurrentPolicy, card_text
+from train.apg.data import require_known
 from train.apg.options import ApgOptions
 from train.apg.stages import Training, to_policy
 from train.shared.cli import parse, read_options
@@ -30,6 +31,7 @@ METRICS: Final = "metrics.json"
 
 def train(options: ApgOptions, console: Console) -> None:
     """Train the agents of all seeds, or go on with that."""
+    require_known(options.training_scenarios(0, 1))  # before anything is written
     if options.seeds == 1:
         return train_one(options, console)
     opened = open_run(options, COMMAND, goes_on=True)

@@ -140,13 +140,17 @@ class Recordings:
 def require_known(scenarios: Sequence[Scenario]) -> None:
     """Raise unless the twin knows all of these lifts."""
     for scenario in scenarios:
-        moves = scenario.target_path is not None or scenario.luffing is not None
-        bed = scenario.water is not None and scenario.water.seabed is not None
-        if moves or bed or scenario.load.height or not scenario.crane.is_plain:
-            raise InvalidValue(
-                "a target or a frame that moves, a seabed, a load with a height, a compensator, friction at the pulley "
-                "or a winch with more limits than speed, acceleration and lag: the twin of train.apg knows none of them"
-            )
+        further = {
+            "target_path": scenario.target_path is not None,
+            "luffing": scenario.luffing is not None,
+            "seabed": scenario.water is not None and scenario.water.seabed is not None,
+            "height of the load": scenario.load.height > 0.0,
+            "compensator, friction at the pulley, or power, torque, layers or drive of the winch": (
+                not scenario.crane.is_plain
+            ),
+        }
+        if found := [name for name, there in further.items() if there]:
+            raise InvalidValue(f"{', '.join(found)}: must not be there, for the twin of train.apg knows none of them")
         if (scenario.sensor_delay or 0.0) > GREATEST_DELAY:
             raise InvalidValue(
                 f"sensor_delay = {scenario.sensor_delay:g} s: must be at most {GREATEST_DELAY:g} s for the twin of "

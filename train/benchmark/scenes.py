@@ -22,7 +22,7 @@ from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario
 from aframe_env.scenario.sea import SeaMotion
 from aframe_env.suite import TASKS, Task, find_task
-from aframe_env.validation import require_integer
+from aframe_env.validation import InvalidValue, require_integer
 from agents.registry import DRUM_STILL, OPTIMUM, BuildContext, PolicySpec, choose_all
 from agents.rollout import Episodes, run
 from train.benchmark.specialists import specialists
@@ -51,6 +51,8 @@ class Options:
 
     def __post_init__(self) -> None:
         require_integer("scenarios", self.scenarios, low=1, high=1000)
+        if not self.tasks:
+            raise InvalidValue(f"tasks = (): must be one or more of {', '.join(map(repr, TASKS))}")
         for name in self.tasks:
             find_task(name)
 

@@ -125,6 +125,15 @@ def test_bad_options_are_refused(changes, words):
         ApgOptions(**changes)
 
 
+@pytest.mark.parametrize(
+    ("task", "words"), [("Splash", "^target_path, height of the load: must"), ("Landing", "^target_path, seabed: must")]
+)
+def test_a_task_that_the_twin_does_not_know_is_refused_before_anything_is_written(tmp_path, task, words):
+    with pytest.raises(InvalidValue, match=words):
+        train(tmp_path / "run", task=task)
+    assert not (tmp_path / "run").exists()
+
+
 def test_on_unknown_it_reckons_how_late_everything_is(tmp_path):
     train(tmp_path / "run", task="Unknown", **NOTHING_LEARNED)
     policy = load(tmp_path / "run")

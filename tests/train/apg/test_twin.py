@@ -243,7 +243,7 @@ def test_an_untrained_network_is_a_regulator():
 
 def test_what_the_twin_does_not_know_is_refused():
     lowered = Scenario(target_path=TargetPath(corners=((5.0, 0.0), (60.0, -20.0))))
-    with pytest.raises(InvalidValue, match="target or a frame that moves"):
+    with pytest.raises(InvalidValue, match=r"^target_path: must not be there, for the twin of train\.apg"):
         record([lowered], CONFIG, 0)
     with pytest.raises(InvalidValue, match=r"sensor_delay = 0\.7 s: must be at most 0\.6 s"):
         record([Scenario(sensor_delay=0.7)], CONFIG, 0)

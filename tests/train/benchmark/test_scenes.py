@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from aframe_env import TASKS, TaskConfig
+from aframe_env import TASKS, InvalidValue, TaskConfig
 from agents import shipped
 from agents.control.optimum import optimise
 from train.benchmark.__main__ import Options, chosen_for
+from train.benchmark.scenes import Options as SceneOptions
 from train.benchmark.scenes import draw, find_scene
 from train.benchmark.specialists import specialists
 
@@ -45,3 +46,16 @@ def test_an_agent_is_the_specialist_of_the_task_that_it_was_trained_on():
     assert [spec.text for spec in chosen_for(TASKS["Storm"], Options(policies=("inverse dynamics",)))] == [
         "inverse dynamics"
     ]
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"tasks": ()}, r"tasks = \(\): must be one"),
+        ({"tasks": ("Calm",)}, "'Calm'"),
+        ({"scenarios": 0}, "scenarios = 0"),
+    ],
+)
+def test_scenes_of_nothing_are_refused(options, says):
+    with pytest.raises(InvalidValue, match=says):
+        SceneOptions(**options)
