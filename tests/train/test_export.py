@@ -20,6 +20,7 @@ from rich.console import Console
 import agents
 from aframe_env import InvalidValue, MotionUnit, Scenario, ScenarioDistribution
 from aframe_env.scenario.crane import Crane, Rope, Winch
+from agents import shipped
 from agents.learned.agent import LearnedPolicy, load
 from agents.policy import DrumStill
 from agents.rollout import held_out_scenarios, run
@@ -175,6 +176,9 @@ def test_bad_input_is_refused_in_a_sentence(
     predictive = said(capsys, monkeypatch, "predictive-ppo", "--out", str(out))
     assert "quadratic programme" in predictive
     assert "aframe export ppo-sensors" in predictive
+    for name in ("apg-storm", str(shipped.folder("apg-storm") / "seed-0")):
+        recurrent = said(capsys, monkeypatch, name, "--out", str(out))
+        assert f"agent = {name!r}: is a recurrent agent" in recurrent
     agent = load("ppo-sensors")
     assert agent.card.sensors is not None
     unit = replace(agent.card, sensors=replace(agent.card.sensors, motion_unit=MotionUnit()))

@@ -19,6 +19,8 @@ from rich.console import Console
 
 from aframe_env.scenario import Scenario, ScenarioDistribution
 from aframe_env.validation import InvalidValue, require_integer
+from agents import shipped
+from agents.learned import recurrent
 from agents.learned.agent import LearnedPolicy, load
 from agents.rollout import held_out_scenarios
 from train.export.check import check
@@ -52,6 +54,12 @@ class Options:
 
 def exportable(name: str) -> LearnedPolicy:
     """The agent. Raises InvalidValue where there is none, or one whose controller no model can hold."""
+    folder = shipped.folder(name)
+    if any(folder.glob(recurrent.CARD)) or any(folder.glob(f"seed-*/{recurrent.CARD}")):
+        raise InvalidValue(
+            f"agent = {name!r}: is a recurrent agent, whose filters and wave bank are not exported: must be one on "
+            "features, as ppo-sensors"
+        )
     agent = load(name)
     if agent.card.action == "predictive":
         raise InvalidValue(
