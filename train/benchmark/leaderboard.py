@@ -93,6 +93,10 @@ class LeaderboardRow:
                 raise InvalidValue(f"{where}: {name} = {each}: must be at most 1, with low below high")
         if self.scenarios < 1 or self.seeds < 1:
             raise InvalidValue(f"{where}: scenarios = {self.scenarios}, seeds = {self.seeds}: must be 1 or more")
+        for name in ("worse_than_still", "parted"):
+            count = getattr(self, name)
+            if not 0.0 <= count <= self.scenarios:
+                raise InvalidValue(f"{where}: {name} = {count!r}: must be in [0, {self.scenarios}] scenarios")
 
 
 def rows_of(

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from aframe_env import TASKS, HarmonicMotion, InvalidValue, Luffing, Scenario, Sensors, TargetPath, TaskConfig
+from aframe_env.scenario import Told
 from agents.control.feedback import Feedback
 from agents.control.lowering import Following
+from agents.control.regulator import Observation
 from agents.control.set_down import SettingDown, into_the_ground, lands
-from agents.policy import DrumStill, Policy
+from agents.policy import DrumStill, FloatArray, Knowledge, Policy
 from agents.registry import BuildContext, choose_all
 from agents.rollout import run
 
@@ -133,6 +136,29 @@ def test_loads_on_soft_ropes_and_under_frames_that_luff_are_left_on_the_ground()
     assert (episodes.landings - episodes.lift_offs == 1).all()
     assert (episodes.lift_offs <= 1).all()
     np.testing.assert_allclose(episodes.tension[:, -1], calm.rope_weight * calm.lengths[0], rtol=0.1)
+
+
+class Spy:
+    """Keeps what it is handed."""
+
+    name, knows = "spy", Knowledge.SENSORS
+
+    def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
+        self.handed = list(scenarios)
+
+    def act(self, observation: Observation, time: float) -> FloatArray:
+        return np.zeros(len(observation))
+
+
+def test_a_policy_is_handed_what_was_told_and_no_seabed() -> None:
+    told = Told(load_mass=55e3, axial_stiffness=1.9e8)
+    spy, true = Spy(), [replace(scenario, told=told) for scenario in scenarios(2)]
+    run(SettingDown(Following(spy, SENSORS), SENSORS), true, CONFIG, episode_duration=1.0)
+    assert len(spy.handed) == 2
+    for each in spy.handed:
+        assert (each.load_mass, each.crane.rope.axial_stiffness, each.told) == (55e3, 1.9e8, None)
+        assert each.water is not None
+        assert each.water.seabed is None
 
 
 def test_nobody_without_readings_sets_a_load_down() -> None:

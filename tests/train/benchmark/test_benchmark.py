@@ -150,6 +150,8 @@ def landing_runs():
         ({"knows": "all"}, "row 0: knows = 'all': must be one of 'nothing', 'clock'"),
         ({"share": {"value": 1.2, "low": 1.1, "high": 1.3}}, "row 0: share = .* must be at most 1"),
         ({"scenarios": 0}, "row 0: scenarios = 0"),
+        ({"worse_than_still": 101}, r"row 0: worse_than_still = 101.0: must be in \[0, 100\] scenarios"),
+        ({"parted": -1.0}, r"row 0: parted = -1.0: must be in \[0, 100\] scenarios"),
         ({"scenarios": "many"}, r"row 0: \[scenarios\] 'many': must be of type int"),
         ({"shares": 1.0}, "row 0: unknown key 'shares'"),
         ({"measures": {"lift_offs": 1.0}}, r"row 0: measures = {'lift_offs': 1.0}: must be none"),
