@@ -6,7 +6,7 @@ import numpy as np
 
 from agents.control.chain import STATE, Chains
 from agents.control.filters import ALL, FloatArray, Rows
-from agents.control.kalman import ACCELERATION_NOISE
+from agents.control.rope_filter import ACCELERATION_NOISE
 
 BIAS = STATE
 """Place of the bias of a reading of the stretch."""

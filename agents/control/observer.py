@@ -10,9 +10,11 @@ from agents.control.chain import Chains
 from agents.control.chain_filter import ChainFilter
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import ALL, FloatArray, Rows
-from agents.control.kalman import RopeFilter, WaveBank, WaveFilter
 from agents.control.lateness import Lateness, require_readings
 from agents.control.regulator import Columns, HoistBatch
+from agents.control.rope_filter import RopeFilter
+from agents.control.wave_bank import WaveBank
+from agents.control.wave_filter import WaveFilter
 
 
 class KalmanObserver:

@@ -13,8 +13,8 @@ from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED
 from aframe_env.validation import InvalidValue
 from agents.control.filters import ALL, FloatArray, Rows
-from agents.control.kalman import WaveFilter
 from agents.control.regulator import Observation
+from agents.control.wave_filter import WaveFilter
 
 FIRST: Final = len(SENSED)
 """Column of the observation that the preview begins at."""

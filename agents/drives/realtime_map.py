@@ -20,8 +20,9 @@ from aframe_env.scenario import Scenario, ScenarioDistribution
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
 from agents.control.expected_waves import ExpectedWaves
-from agents.control.kalman import WaveBank, WaveFilter
 from agents.control.regulator import Columns, HoistBatch, Observation
+from agents.control.wave_bank import WaveBank
+from agents.control.wave_filter import WaveFilter
 from agents.control.winch import WinchModel
 from agents.drives.map import DriveMap
 from agents.policy import FloatArray, Knowledge

@@ -22,12 +22,12 @@ from aframe_env.task import SENSED, STATE, quantities
 from aframe_env.validation import InvalidValue
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import FloatArray
-from agents.control.kalman import RopeFilter
 from agents.control.lateness import require_readings
 from agents.control.lift import Lift
 from agents.control.observer import KalmanObserver, observer_for
 from agents.control.previewed_path import PreviewedPath
 from agents.control.regulator import Columns, HoistBatch, Observation
+from agents.control.rope_filter import RopeFilter
 from agents.learned.features import DAMPING_RATIO, lift_features, winch_features
 
 Float32Array = npt.NDArray[np.float32]

@@ -19,8 +19,10 @@ from torch import nn
 from aframe_env.scenario.crane import GRAVITY
 from aframe_env.scenario.sensors import Sensors
 from agents.control.expected_waves import ExpectedWaves
-from agents.control.kalman import ACCELERATION_NOISE, LEAST_MISFIT, WaveBank, exponents, schedule
 from agents.control.lift import LEAST_WEIGHT
+from agents.control.rope_filter import ACCELERATION_NOISE
+from agents.control.wave_bank import WaveBank, exponents, schedule
+from agents.control.wave_filter import LEAST_MISFIT
 from agents.learned.agent import LearnedPolicy
 from agents.learned.features import DAMPING_RATIO, LIMIT, lift_features, load_features, wanted_turn
 from train.export.interface import Field, Tensor, readings_of, told_of

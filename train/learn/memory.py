@@ -15,8 +15,8 @@ import numpy as np
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from agents.control.kalman import Schedule, WaveBank
 from agents.control.predictive import PlanningConfig
+from agents.control.wave_bank import Schedule, WaveBank
 from agents.learned.features import FeatureConfig
 
 FIXED: Final = (Schedule, WaveBank, PlanningConfig, FeatureConfig)

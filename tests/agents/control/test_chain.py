@@ -9,9 +9,9 @@ from aframe_env import Crane, LoadShape, Rope, Scenario, TaskConfig, Water, find
 from agents.control.chain import STATE, Chains, Hanging
 from agents.control.chain_filter import ChainFilter
 from agents.control.expected_waves import ExpectedWaves
-from agents.control.kalman import RopeFilter
 from agents.control.predictive import PlanningConfig, PredictiveControl
 from agents.control.rope import RopeModel
+from agents.control.rope_filter import RopeFilter
 from agents.rollout import run
 
 PERIOD = 0.1

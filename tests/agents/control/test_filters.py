@@ -10,8 +10,10 @@ from scipy.signal import freqs, lsim
 from aframe_env.scenario.motion_unit import MotionUnit
 from aframe_env.scenario.sensors import Sensors
 from agents.control.expected_waves import ExpectedWaves
-from agents.control.kalman import ACCELERATION_NOISE, RopeFilter, WaveBank, WaveFilter
 from agents.control.rope import RopeModel
+from agents.control.rope_filter import ACCELERATION_NOISE, RopeFilter
+from agents.control.wave_bank import WaveBank
+from agents.control.wave_filter import WaveFilter
 
 PERIOD = 0.1
 WAVES = ExpectedWaves(frequency=(0.5, 0.8, 1.3), variances=((0.02, 0.2, 0.07),), build_up=1.0)
