@@ -91,7 +91,8 @@ def _leaves(root: object) -> Iterator[_Leaf]:
 
     def walk(place: str, value: Any, replace: Callable[[Any], object] | None) -> Iterator[_Leaf]:
         if isinstance(value, np.ndarray):
-            if value.flags.writeable:
+            # What a lift is does not change, and is handed over anew when the next one begins.
+            if value.flags.writeable and value.dtype != object:
                 yield _Leaf(place, value, replace)
         elif isinstance(value, torch.Tensor):
             yield _Leaf(place, value, replace)
