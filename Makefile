@@ -51,7 +51,7 @@ results: .venv/installed-test
 	$(BIN)/python -m train.evaluate --model rfem --privileged 0 --workers 2 --overwrite --out results/comparison-full-model \
 		--policies predictive-ppo ppo sac ppo-speed sac-speed predictive-ppo-sensors ppo-sensors sac-sensors \
 		"predictive control (state)" "predictive control" "feed-forward + feedback (state)" "feed-forward + feedback"
-	for task in storm unknown preview; do \
+	for task in storm unknown preview mru; do \
 		$(BIN)/python -m train.apg --task $$task --overwrite --out results/agents/apg-$$task/seed-0 || exit; done
 	$(BIN)/python -m train.apg --task storm --observation state --overwrite --out results/agents/apg-state-storm/seed-0
 	$(BIN)/python -m train.benchmark --workers 1 --overwrite --out results/tasks

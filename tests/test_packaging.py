@@ -82,6 +82,7 @@ print(agents.drives.map.load().shape, agents.registry.choose("drive-map:clock").
     expected += [f"{folder.name} ['{names.get(folder.name, 'recurrent APG on sensors')}']" for folder in recurrent]
     assert [folder.name for folder in recurrent] == [
         "apg-deeprope",
+        "apg-mru",
         "apg-preview",
         "apg-state-storm",
         "apg-storm",

@@ -130,7 +130,7 @@ ON_SENSORS = [
 
 
 def test_recurrent_agents_without_a_radar_are_among_them() -> None:
-    assert {"apg-deeprope", "apg-storm", "apg-unknown"} == set(ON_SENSORS) & set(shipped.RECURRENT)
+    assert {"apg-deeprope", "apg-mru", "apg-storm", "apg-unknown"} == set(ON_SENSORS) & set(shipped.RECURRENT)
 
 
 @pytest.mark.parametrize("name", ON_SENSORS)
