@@ -155,3 +155,15 @@ def test_the_map_in_real_time_removes_what_the_page_says():
         reduction = 100.0 * np.sort(1.0 - run(policy, scenarios, observation=observation).rms / still)
         found = [np.median(reduction), reduction.mean(), reduction[:10].mean()]
         assert found == pytest.approx(said[policy.name, policy.knows.value], abs=0.1)
+
+
+def test_the_tasks_are_as_good_as_their_page_says():
+    said = {line.split("`")[1].split("-")[1]: cells(line) for line in table(ROOT / "docs/tasks.md", "| task |")[3:]}
+    shown = table(README, "| task |")[2:]
+    assert {line.strip("| ").split(":")[0] for line in shown} == set(said)
+    for line in shown:
+        name, law, agent = cells(line)
+        _, _, _, best_law, best_agent = said[name.split(":")[0]]
+        assert best_law.endswith(f", {law}")
+        assert best_agent.startswith("recurrent APG") == (agent != "none yet")
+        assert agent == "none yet" or best_agent.endswith(f", {agent}")
