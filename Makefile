@@ -55,7 +55,7 @@ results: .venv/installed-test
 		$(BIN)/python -m train.apg --task $$task --overwrite --out results/agents/apg-$$task/seed-0 || exit; done
 	$(BIN)/python -m train.apg --task storm --observation state --overwrite --out results/agents/apg-state-storm/seed-0
 	$(BIN)/python -m train.benchmark --workers 1 --overwrite --out results/tasks
-	$(BIN)/python -m train.benchmark.scenes --out results/tasks
+	$(BIN)/python -m train.scenes --out results/tasks
 	$(BIN)/python -m train.sensitivity --overwrite --out results/sensitivity
 	$(BIN)/python -m train.deep_water --overwrite --out results/deep-water
 	$(BIN)/python -m train.verify

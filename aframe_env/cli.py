@@ -18,6 +18,7 @@ COMMANDS: Final[Mapping[str, str]] = {
     "gpu-ppo": "train a PPO agent of rsl_rl on a GPU",
     "evaluate": "compare policies on held-out scenarios, and write the report",
     "benchmark": "score policies on the tasks of the suite",
+    "scenes": "draw one telling scenario of each task",
     "drives": "optimise drum drives for one scenario, as in the paper",
     "drive-map": "build the map of basic drives",
     "optimisers": "compare Gauss-Newton with Nelder-Mead",

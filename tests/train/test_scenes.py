@@ -12,9 +12,9 @@ from aframe_env import TASKS, InvalidValue, TaskConfig
 from agents import shipped
 from agents.control.optimum import optimise
 from train.benchmark.__main__ import Options, chosen_for
-from train.benchmark.scenes import Options as SceneOptions
-from train.benchmark.scenes import draw, find_scene
 from train.benchmark.specialists import specialists
+from train.scenes import Options as SceneOptions
+from train.scenes import draw, find_scene
 
 
 def test_a_scene_is_a_hard_scenario_and_no_freak(tmp_path):

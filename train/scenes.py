@@ -1,4 +1,4 @@
-"""Draw one telling scenario of each task: ``python -m train.benchmark.scenes --tasks Storm --out results/tasks``.
+"""Draw one telling scenario of each task: ``python -m train.scenes --tasks Storm --out results/tasks``.
 
 Of the first validation scenarios the one that has the law's share of the ceiling in the middle of its worse half: hard,
 but no freak. What the load does is drawn under a drum left still, under the law, an agent and the best drum commands,
@@ -141,7 +141,7 @@ def _label(figure: Figure, panels: Sequence[Axes], scene: Scene) -> None:
 def main() -> int:
     """Run the command."""
     with user_errors():
-        options = parse(Options, "train.benchmark.scenes", __doc__ or "")
+        options = parse(Options, "train.scenes", __doc__ or "")
         console: Console = PlainConsole()
         for name in options.tasks:
             task = find_task(name)
