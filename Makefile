@@ -53,6 +53,7 @@ results: .venv/installed-test
 		"predictive control (state)" "predictive control" "feed-forward + feedback (state)" "feed-forward + feedback"
 	for task in storm unknown preview mru; do \
 		$(BIN)/python -m train.apg --task $$task --overwrite --out results/agents/apg-$$task/seed-0 || exit; done
+	$(BIN)/python -m train.apg --task deeprope --episodes 750 --labels 80000 --imitation-steps 1500 --updates 230 --look-every 25 --overwrite --out results/agents/apg-deeprope/seed-0
 	$(BIN)/python -m train.apg --task storm --observation state --overwrite --out results/agents/apg-state-storm/seed-0
 	$(BIN)/python -m train.benchmark --workers 1 --overwrite --out results/tasks
 	$(BIN)/python -m train.scenes --out results/tasks
