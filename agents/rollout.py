@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -96,12 +96,19 @@ class Episodes:
         """(N,) root mean square depth error, m."""
         return np.sqrt(self.omega1 / self.duration)
 
+    def rows(self, which: slice) -> Episodes:
+        """Return some of the episodes."""
+        return replace(self, **{name: getattr(self, name)[which] for name in self._arrays()})
+
     @classmethod
     def joined(cls, parts: Sequence[Episodes]) -> Episodes:
         """Return the episodes of all parts, one after the other."""
-        names = [each.name for each in fields(cls) if each.name != "duration"]
-        arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+        arrays = {name: np.concatenate([getattr(part, name) for part in parts]) for name in cls._arrays()}
         return cls(duration=parts[0].duration, **arrays)
+
+    @classmethod
+    def _arrays(cls) -> list[str]:
+        return [each.name for each in fields(cls) if each.name != "duration"]
 
 
 def run(

@@ -23,11 +23,11 @@ from aframe_env.scenario import Scenario
 from aframe_env.scenario.sea import SeaMotion
 from aframe_env.suite import TASKS, Task, find_task
 from aframe_env.validation import InvalidValue, require_integer
-from agents.registry import DRUM_STILL, OPTIMUM, BuildContext, PolicySpec, choose_all
-from agents.rollout import Episodes, run
+from agents.registry import DRUM_STILL, OPTIMUM, choose_all
+from agents.rollout import Episodes
 from train.benchmark.specialists import specialists
 from train.evaluate.figure import COLOURS, GREY
-from train.evaluate.run import observation_of
+from train.evaluate.run import run_on
 from train.shared.cli import parse
 from train.shared.console import PlainConsole
 from train.shared.run_folder import user_errors, write_atomically
@@ -73,22 +73,17 @@ class Scene:
         return float((still - self.runs[name].rms[0]) / (still - best))
 
 
-def find_scene(task: Task, count: int) -> Scene:
-    """Choose a task's scene among so many validation scenarios, and run everybody in it."""
-    config, scenarios = TaskConfig(**task.arguments), task.scenarios("validation", count)
-    specs = choose_all([LAWS.get(task.name, LAW), *specialists(task, "sensors")])
-    still, law, best = (_run(spec, config, scenarios, task) for spec in (DRUM_STILL, specs[0], OPTIMUM))
-    order = np.argsort((still.rms - law.rms) / (still.rms - best.rms))
+def find_scene(task: Task, count: int, console: Console | None = None) -> Scene:
+    """Run everybody in so many validation scenarios of a task, and choose its scene among them."""
+    scenarios = task.scenarios("validation", count)
+    specs = [*choose_all([LAWS.get(task.name, LAW), *specialists(task, "sensors")]), OPTIMUM]
+    seed = task.seed("validation")
+    ran = run_on(specs, TaskConfig(**task.arguments), scenarios, console or PlainConsole(), seed=seed)
+    still, law, *_, best = (entry.episodes.rms for entry in ran.entries)
+    order = np.argsort((still - law) / (still - best))
     number = int(order[len(order) // 4])
-    chosen = scenarios[number : number + 1]
-    runs = {spec.name: _run(spec, config, chosen, task, number) for spec in (DRUM_STILL, *specs, OPTIMUM)}
-    return Scene(task, number, chosen[0], runs)
-
-
-def _run(spec: PolicySpec, config: TaskConfig, scenarios: Sequence[Scenario], task: Task, first: int = 0) -> Episodes:
-    policy = spec.policy(BuildContext(scenarios=scenarios, config=config))
-    seen = config.replaced(observation=observation_of(policy, config))
-    return run(policy, scenarios, seen, noise_seed=task.seed("validation"), first=first)
+    runs = {entry.policy: entry.episodes.rows(slice(number, number + 1)) for entry in ran.entries}
+    return Scene(task, number, scenarios[number], runs)
 
 
 def draw(path: Path, scene: Scene) -> None:
@@ -145,7 +140,7 @@ def main() -> int:
         console: Console = PlainConsole()
         for name in options.tasks:
             task = find_task(name)
-            scene = find_scene(task, options.scenarios)
+            scene = find_scene(task, options.scenarios, console)
             path = options.out / task.name.lower() / PICTURE
             path.parent.mkdir(parents=True, exist_ok=True)
             draw(path, scene)
