@@ -114,7 +114,7 @@ class PolicySpec:
         following = Following(policy, sensors)
         if blind or not any(map(lands, context.scenarios)):
             return following
-        return SettingDown(following, sensors)
+        return SettingDown(following)
 
 
 def _drum_still(context: BuildContext) -> Policy:

@@ -14,7 +14,6 @@ from typing import Final
 import numpy as np
 
 from aframe_env.scenario import Crane, Scenario, TargetPath
-from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue
 from agents.control.lowering import BLIND, Following, PayOut
@@ -86,13 +85,13 @@ class SettingDown:
     """Let a policy that follows its targets leave those loads on the ground that land on it."""
 
     policy: Following
-    sensors: Sensors | None = None
-    """Sensors that it acts on; None for the full state."""
     name: str = field(init=False)
     knows: Knowledge = field(init=False)
     _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
     _told: Sequence[Scenario] = field(init=False, repr=False, default=())
-    """The same as the policy is told them."""
+    """The same as the policy is told them: other ones where the load lands."""
+    _most: FloatArray = field(init=False, repr=False)
+    """(N,) greatest speeds of the drums, rad/s."""
     _period: float = field(init=False, repr=False, default=0.1)
     _least: FloatArray = field(init=False, repr=False)
     """(N,) tension at the pulley below which a load has landed, N; -inf where none does."""
@@ -115,23 +114,24 @@ class SettingDown:
         """Begin N episodes; of the scenarios only what a ``Lift`` has, target and seabed count."""
         self._scenarios, self._period = scenarios, control_period
         self._told = [into_the_ground(s, 2.0 * SLACK + STRETCH * s.rope_length) if lands(s) else s for s in scenarios]
+        self._most = np.array([scenario.crane.winch.max_speed for scenario in scenarios])
         self._least = np.zeros(0)
         self.policy.reset(self._told, control_period)
 
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for observations (N, K)."""
-        columns = [q.name for q in (STATE if self.sensors is None else SENSED)]
+        sensors = self.policy.sensors
+        columns = [q.name for q in (STATE if sensors is None else SENSED)]
         tension = observation[:, columns.index("rope_tension")].astype(np.float64)
         if not len(self._least):
             self._start(tension)
         landed = np.isnan(self._left) & (tension < self._least) & (time >= self._from)
         self._left[landed] = self._slack[landed]
-        then = time - (0.0 if self.sensors is None else self.sensors.delay)
+        then = time - (0.0 if sensors is None else sensors.delay)
         seen = observation.copy()
         seen[:, columns.index("depth_error")] += self._above(then)
         command = self.policy.act(seen, time)
-        most = np.array([scenario.crane.winch.max_speed for scenario in self._scenarios])
-        leaving = np.minimum(most, self._left / self._period)
+        leaving = np.minimum(self._most, self._left / self._period)
         self._left -= self._period * leaving
         return np.asarray(np.where(np.isnan(leaving), command, leaving))
 
@@ -147,7 +147,7 @@ class SettingDown:
         plans = [PayOut.weighed(s, each) for s, each in zip(self._scenarios, tension.tolist(), strict=True)]
         ends = [plan.at(plan.scenario.target_path.duration if plan.scenario.target_path else 0.0) for plan in plans]
         weights = np.array([plan.weight for plan in plans])
-        down = np.array([lands(scenario) for scenario in self._scenarios])
+        down = np.array([told is not true for told, true in zip(self._told, self._scenarios, strict=True)])
         self._from = np.array([way_down(s.target_path)[-1][0] if s.target_path else 0.0 for s in self._scenarios])
         self._least = np.where(down, np.array([end.tension for end in ends]) - BORNE * weights, -np.inf)
         stiffness = np.array([scenario.crane.rope.axial_stiffness for scenario in self._scenarios])

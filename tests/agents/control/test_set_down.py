@@ -34,7 +34,7 @@ def test_a_load_that_is_set_down_is_lifted_less_often_and_stays_at_its_level(sen
         run(policy, scenarios(), config)
         for policy in (
             Following(Feedback(sensors), sensors),
-            SettingDown(Following(Feedback(sensors), sensors), sensors),
+            SettingDown(Following(Feedback(sensors), sensors)),
         )
     )
     assert left.lift_offs.sum() < 0.5 * held.lift_offs.sum()
@@ -46,7 +46,7 @@ def test_a_load_that_is_set_down_is_lifted_less_often_and_stays_at_its_level(sen
 
 def test_in_calm_water_it_lands_at_the_speed_of_its_way() -> None:
     calm = [replace(s, motion=HarmonicMotion(harmonics=())) for s in scenarios(3)]
-    episodes = run(SettingDown(Following(Feedback(SENSORS), SENSORS), SENSORS), calm, CONFIG)
+    episodes = run(SettingDown(Following(Feedback(SENSORS), SENSORS)), calm, CONFIG)
     # The ground, which is a spring and a damper, may throw it up once by a hair.
     assert (episodes.landings <= 2).all()
     assert (episodes.landings - episodes.lift_offs == 1).all()
@@ -57,10 +57,10 @@ def test_in_calm_water_it_lands_at_the_speed_of_its_way() -> None:
 def test_before_it_is_down_and_elsewhere_the_policy_is_left_alone() -> None:
     short = CONFIG.replaced(episode_duration=20.0)
     plain, wrapped = Following(Feedback(SENSORS), SENSORS), Following(Feedback(SENSORS), SENSORS)
-    one, other = run(plain, scenarios(3), short), run(SettingDown(wrapped, SENSORS), scenarios(3), short)
+    one, other = run(plain, scenarios(3), short), run(SettingDown(wrapped), scenarios(3), short)
     np.testing.assert_array_equal(one.drum_speed, other.drum_speed)
     holding = [replace(s, target_path=None) for s in scenarios(2)]
-    one, other = run(plain, holding, short), run(SettingDown(wrapped, SENSORS), holding, short)
+    one, other = run(plain, holding, short), run(SettingDown(wrapped), holding, short)
     np.testing.assert_array_equal(one.drum_speed, other.drum_speed)
 
 
@@ -131,7 +131,7 @@ def test_loads_on_soft_ropes_and_under_frames_that_luff_are_left_on_the_ground()
     luffed = replace(calm, crane=out, luffing=luffing, target_level=target, water=replace(calm.water, seabed=bed))
     ways = [each.pulley_position[2] + each.drum_to_pulley for each in luffed.cranes]
     assert max(ways) - min(ways) > 9.0  # more than is paid out of it below a frame that holds
-    policy = SettingDown(Following(Feedback(SENSORS), SENSORS), SENSORS)
+    policy = SettingDown(Following(Feedback(SENSORS), SENSORS))
     episodes = run(policy, [replace(calm, crane=soft), luffed], CONFIG, episode_duration=160.0)
     assert (episodes.landings - episodes.lift_offs == 1).all()
     assert (episodes.lift_offs <= 1).all()
@@ -153,7 +153,7 @@ class Spy:
 def test_a_policy_is_handed_what_was_told_and_no_seabed() -> None:
     told = Told(load_mass=55e3, axial_stiffness=1.9e8)
     spy, true = Spy(), [replace(scenario, told=told) for scenario in scenarios(2)]
-    run(SettingDown(Following(spy, SENSORS), SENSORS), true, CONFIG, episode_duration=1.0)
+    run(SettingDown(Following(spy, SENSORS)), true, CONFIG, episode_duration=1.0)
     assert len(spy.handed) == 2
     for each in spy.handed:
         assert (each.load_mass, each.crane.rope.axial_stiffness, each.told) == (55e3, 1.9e8, None)
