@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from frame_energy import frame_energy
 from scipy.integrate import cumulative_simpson
 
 from aframe_env import HarmonicMotion, Scenario, TorqueDrive, Winch
@@ -41,12 +42,8 @@ def still_lift(rope_damping: float, **drive: float) -> Scenario:
 
 def energy(engine: FlexibleEngine, scenario: Scenario) -> float:
     """Energy of frame, light rope, load and drum above a still deck, J, by their definitions."""
-    frame, row, table = engine.frames[0], engine.blocks[0], engine._tables[0]
-    count = int(table[flex.COUNT])
-    place, rate = frame[flex.MODES :].reshape(-1, flex.MODE_SLOTS)[:count, :2].T
-    modes = table[flex.HEAD :][: count * flex.MODE_SIZE].reshape(count, -1)
-    found = 0.5 * (rate**2 + modes[:, flex.SQUARE] * place**2) + scenario.gravity * modes[:, flex.FIELD + 2] * place
-    pulley = row[at.PULLEY_ON_DECK :][:3] + place @ modes[:, flex.SHAPE : flex.SHAPE + 3]
+    frame, row = engine.frames[0], engine.blocks[0]
+    found, pulley = frame_energy(engine, scenario.gravity)
     position, velocity = row[at.LOAD_POSITION :][:3], row[at.LOAD_VELOCITY :][:3]
     distance = np.linalg.norm(position - pulley) + np.linalg.norm(frame[flex.DRUM : flex.DRUM + 3] - pulley)
     length = scenario.free_length + RADIUS * row[at.DRUM_ANGLE]
@@ -55,7 +52,7 @@ def energy(engine: FlexibleEngine, scenario: Scenario) -> float:
     assert drive is not None
     kinetic = 0.5 * scenario.load_mass * velocity @ velocity + 0.5 * drive.inertia * row[at.DRUM_SPEED] ** 2
     strain = 0.5 * scenario.crane.rope.axial_stiffness * stretch**2 / length
-    return float(found.sum() + kinetic + scenario.weight * position[2] + strain)
+    return float(found + kinetic + scenario.weight * position[2] + strain)
 
 
 def test_the_drive_s_work_is_what_has_become_of_it() -> None:

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
+from frame_energy import frame_energy
 
 from aframe_env import (
     LOADS,
@@ -185,12 +186,8 @@ def test_the_head_bears_a_swinging_rope_sideways() -> None:
 
 def energy(engine: FlexibleEngine, scenario: Scenario) -> float:
     """Energy of frame, rope and load above a still deck, J, by their definitions."""
-    frame, row, table = engine.frames[0], engine.blocks[0], engine._tables[0]
-    count = int(table[flex.COUNT])
-    place, rate = frame[flex.MODES :].reshape(-1, flex.MODE_SLOTS)[:count, :2].T
-    modes = table[flex.HEAD :][: count * flex.MODE_SIZE].reshape(count, -1)
-    found = 0.5 * (rate**2 + modes[:, flex.SQUARE] * place**2) + scenario.gravity * modes[:, flex.FIELD + 2] * place
-    pulley = row[at.PULLEY_ON_DECK :][:3] + place @ modes[:, flex.SHAPE : flex.SHAPE + 3]
+    frame, row = engine.frames[0], engine.blocks[0]
+    found, pulley = frame_energy(engine, scenario.gravity)
     lumps, softness = scenario.springs - 1, 1.0 / scenario.crane.rope.axial_stiffness
     below, speed = row[at.LIFT :][: lumps + 1], row[at.LIFT + at.SPRINGS_MOST :][: lumps + 1]
     position, velocity = row[at.LOAD_POSITION :][:3], row[at.LOAD_VELOCITY :][:3]
@@ -211,7 +208,7 @@ def energy(engine: FlexibleEngine, scenario: Scenario) -> float:
     rests = np.full(lumps + 1, element)
     rests[0], rests[-1] = 0.5 * element, 0.5 * element + drum_part
     stretch = np.maximum(ends[:-1] - ends[1:] - rests, 0.0)
-    return float(found.sum() + kinetic + potential + 0.5 * (stretch**2 / rests).sum() / softness)
+    return float(found + kinetic + potential + 0.5 * (stretch**2 / rests).sum() / softness)
 
 
 def test_energy_of_a_swinging_load_stays() -> None:
