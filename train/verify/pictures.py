@@ -18,9 +18,11 @@ from aframe_env.rfem.statics import static
 from aframe_env.scenario.crane import Crane
 from train.shared.run_folder import write_atomically
 from train.verify.cases import dynamic_columns
+from train.verify.drive_checks import torque_run
 from train.verify.frame_checks import CASES, model
 from train.verify.luffing_checks import swing_run
 from train.verify.run_checks import paper_run, ramp_release, shock_run
+from train.verify.water_checks import PERIOD
 
 HERE, REFERENCE = "#1f77b4", "#d62728"
 
@@ -219,6 +221,20 @@ def swing_histories() -> Figure:
     return figure
 
 
+def torque_histories() -> Figure:
+    """Draw a drum with inertia under torque below the flexible frame: load, drum, rope, deflection of S."""
+    run = torque_run()
+    panels = [
+        Panel("xL3_m", "Level of the load", "$x_{L3}$", "m", 1.0),
+        Panel("drum_rad_s", "Speed of the drum", r"$\dot\varphi_H$", "rad/s", 1.0),
+        Panel("T_rope_N", "Tension of the rope", "$T$", "kN", 1e-3),
+        OUTBOARD,
+        UPWARDS,
+    ]
+    times = PERIOD * np.arange(len(run.here["xL3_m"]), dtype=np.float64)
+    return _histories(times, run.here, run.there, panels, ("environment", "stand-alone run"))
+
+
 def figure_14() -> Figure:
     """Draw x_L3 in the full and the simplified model, and their difference."""
     here, there, rigid = (
@@ -259,6 +275,7 @@ def draw_all(folder: Path) -> list[Path]:
             ("release_ramp", release_histories),
             ("shock", shock_histories),
             ("swing", swing_histories),
+            ("drum_under_torque", torque_histories),
             ("figure_11_deflection", figure_11),
             ("figure_12_forces", figure_12),
             ("figure_14_load", figure_14),
