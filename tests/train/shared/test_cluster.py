@@ -191,7 +191,9 @@ def test_a_driver_that_is_gone_loses_only_what_was_in_flight(
     until(lambda: not started.working())
     (tmp_path / "go").touch()
     again = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60.0, check=False)
-    assert (again.returncode, again.stdout.splitlines()[-1]) == (0, "[0, 1, 2, 3, 4, 5]"), again.stderr
+    # Ray tells a driver, on its standard output, of nodes that were lost, such as the one of a test before.
+    assert again.returncode == 0, again.stderr
+    assert "[0, 1, 2, 3, 4, 5]" in again.stdout.splitlines()
     assert sorted(computed.read_text().split()) == ["0", "1", "2", "3", "3", "4", "4", "5"]
 
 
