@@ -78,6 +78,7 @@ CHECKS: Sequence[Callable[[], Check | list[Check]]] = (
     run_checks.releases,
     run_checks.paper_case,
     run_checks.shocks,
+    run_checks.rough_seas,
     luffing_checks.swings,
     luffing_checks.rigid_swing,
     drive_checks.torque_drive_on_flexible_frame,

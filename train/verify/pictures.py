@@ -21,10 +21,10 @@ from train.verify.cases import dynamic_columns
 from train.verify.drive_checks import torque_run
 from train.verify.frame_checks import CASES, model
 from train.verify.luffing_checks import swing_run
-from train.verify.run_checks import paper_run, ramp_release, shock_run
+from train.verify.run_checks import paper_run, ramp_release, sea_run, shock_run
 from train.verify.water_checks import PERIOD
 
-HERE, REFERENCE = "#1f77b4", "#d62728"
+HERE, REFERENCE, SECOND_ORDER = "#1f77b4", "#d62728", "#2ca02c"
 
 
 def save(figure: Figure, path: Path) -> None:
@@ -147,6 +147,8 @@ class Panel(NamedTuple):
 
 OUTBOARD = Panel("uS1_m", "Deflection of S outboard", "$u_{S,x}$", "mm", 1e3)
 UPWARDS = Panel("uS3_m", "Deflection of S upwards", "$u_{S,z}$", "mm", 1e3)
+LOAD = Panel("xL3_m", "Level of the load", "$x_{L3}$", "m", 1.0)
+TENSION = Panel("T_rope_N", "Tension of the rope", "$T$", "kN", 1e-3)
 SERVOMOTOR = Panel("S_R_N", "Tension of the right servomotor", "$S_R$", "kN", 1e-3)
 REACTIONS = tuple(
     Panel(f"RAR{axis + 1}_N", f"Reaction of the right foot, {along}", f"$R_{{AR,{letter}}}$", "kN", 1e-3)
@@ -160,6 +162,7 @@ def _histories(
     there: dict[str, Array],
     panels: list[Panel],
     names: tuple[str, str],
+    second_order: dict[str, Array] | None = None,
 ) -> Figure:
     figure = Figure(figsize=(11, 2.6 * len(panels)), layout="constrained")
     grid = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
@@ -172,6 +175,10 @@ def _histories(
         about_mean = np.max(np.abs(ours - theirs - np.mean(ours - theirs))) / np.ptp(theirs)
         if about_mean < 0.5 * gap:
             title += f"; {about_mean:.2%} apart from a constant"
+        if second_order is not None:
+            closer = second_order[panel.column]
+            axis.plot(time, closer * panel.scale, color=SECOND_ORDER, linewidth=0.9, label="with second order")
+            title += f"; with second order {np.max(np.abs(closer - theirs)) / np.ptp(theirs):.2%}"
         axis.set_title(title, fontsize=9)
         axis.set_ylabel(f"{panel.symbol}, {panel.unit}")
     grid[0].legend(fontsize=8, loc="upper right")
@@ -210,13 +217,22 @@ def shock_histories() -> Figure:
     return _histories(here["t_s"], here, there, [OUTBOARD, UPWARDS, SERVOMOTOR, *REACTIONS], _FLEXIBLE)
 
 
+def sea_histories() -> Figure:
+    """Draw a sea of Hs 6 m with the drum still: load, rope, deflection of S, servomotor force, reactions."""
+    run = sea_run()
+    panels = [LOAD, TENSION, OUTBOARD, UPWARDS, SERVOMOTOR, *REACTIONS]
+    names = ("environment", "stand-alone run, 120/100 rfes")
+    return _histories(run.there["t_s"], run.here, run.there, panels, names)
+
+
 def swing_histories() -> Figure:
-    """Draw a frame that luffs from −20° to 25°: load, deflection of S, servomotor force, reactions."""
+    """Draw a frame that luffs from −20° to 25°, linear and of second order: load, deflection of S, forces."""
     run = swing_run()
-    load = Panel("xL3_m", "Level of the load", "$x_{L3}$", "m", 1.0)
-    names = ("rfem 20/16", "geometrically exact beams")
-    panels = [load, OUTBOARD, UPWARDS, SERVOMOTOR, *REACTIONS]
-    figure = _histories(run.here["t_s"], run.here, run.there, panels, names)
+    names = ("rfem 20/16, linear", "geometrically exact beams")
+    panels = [LOAD, OUTBOARD, UPWARDS, SERVOMOTOR, *REACTIONS]
+    figure = _histories(
+        run.here["t_s"], run.here, run.there, panels, names, second_order=swing_run(second_order=True).here
+    )
     figure.axes[0].legend(fontsize=8, loc="lower left")
     return figure
 
@@ -225,9 +241,9 @@ def torque_histories() -> Figure:
     """Draw a drum with inertia under torque below the flexible frame: load, drum, rope, deflection of S."""
     run = torque_run()
     panels = [
-        Panel("xL3_m", "Level of the load", "$x_{L3}$", "m", 1.0),
+        LOAD,
         Panel("drum_rad_s", "Speed of the drum", r"$\dot\varphi_H$", "rad/s", 1.0),
-        Panel("T_rope_N", "Tension of the rope", "$T$", "kN", 1e-3),
+        TENSION,
         OUTBOARD,
         UPWARDS,
     ]
@@ -274,6 +290,7 @@ def draw_all(folder: Path) -> list[Path]:
             ("mode_shapes", mode_shapes),
             ("release_ramp", release_histories),
             ("shock", shock_histories),
+            ("rough_sea", sea_histories),
             ("swing", swing_histories),
             ("drum_under_torque", torque_histories),
             ("figure_11_deflection", figure_11),
