@@ -20,7 +20,7 @@ from scipy.linalg import eigh, expm
 from aframe_env.scenario import Scenario
 from aframe_env.scenario.crane import GRAVITY, Rope
 from agents.control.filters import FloatArray, Rows
-from agents.control.lift import LEAST_WEIGHT, Lift
+from agents.control.lift import LEAST_WEIGHT, Lift, share_under_water
 
 MODES: Final = 2
 """Modes of a rope with mass, the load's bobbing among them."""
@@ -52,27 +52,30 @@ class Hanging(NamedTuple):
     def of(cls, scenario: Scenario) -> Hanging:
         """What truly hangs in a scenario."""
         below, drum_part = scenario.lengths
-        inertia = scenario.load_mass + scenario.load.added_mass_vertical
-        return cls(scenario.crane.rope, below, drum_part, inertia, drag_of(scenario, below), scenario.loss_time)
+        share = share_under_water(scenario, below)
+        inertia = scenario.load_mass + share * scenario.load.added_mass_vertical
+        return cls(scenario.crane.rope, below, drum_part, inertia, drag_of(scenario, below, share), scenario.loss_time)
 
     @classmethod
-    def weighed(cls, lift: Lift, rope_length: float, mass: float) -> Hanging:
-        """What is known on board: the lift, unstretched rope from drum to load, m, and the mass that bobs, kg."""
+    def weighed(cls, lift: Lift, rope_length: float, mass: float, share: float) -> Hanging:
+        """What is known on board: the lift, unstretched rope from drum to load, m, the mass that bobs, kg, and the
+        share of the load that is under water."""
         rope, drum_part = lift.crane.rope, lift.crane.drum_to_pulley
         below = max(rope_length - drum_part, LEAST_BELOW)
         # A pin that reads less than the rope alone weighs must not make a load of less than nothing.
         inertia = max(mass - rope.mass_per_length * below / 3.0, LEAST_WEIGHT / GRAVITY)
-        return cls(rope, below, drum_part, inertia, drag_of(lift, below), rope.loss_time)
+        return cls(rope, below, drum_part, inertia, drag_of(lift, below, share), rope.loss_time)
 
 
-def drag_of(lift: Lift, below: float) -> float:
-    """½ ρ C_d A [N s²/m²] of a load, with what has as much work of the water along ``below`` m of rope."""
+def drag_of(lift: Lift, below: float, share: float) -> float:
+    """½ ρ C_d A [N s²/m²] of a load of which a ``share`` is wet, with what has as much work of the water along
+    ``below`` m of rope."""
     if lift.water is None:
         return 0.0
     rope = lift.crane.rope
     # Along the rope the speed falls from the load's to that of the still pulley, and the work with its cube.
     along = rope.tangential_drag * math.pi * rope.solid_diameter * below / 4.0
-    return 0.5 * lift.water.density * (lift.load.drag_area_vertical + along)
+    return 0.5 * lift.water.density * (share * lift.load.drag_area_vertical + along)
 
 
 class Chains(NamedTuple):

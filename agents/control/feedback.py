@@ -53,10 +53,10 @@ class Feedback:
         """Begin N episodes; of the scenarios only what a ``Lift`` has is looked at."""
         self._scenarios, self._period, self._hoists = scenarios, control_period, None
 
-    def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
-        """Go on with other ropes, as by ``HoistBatch.retune``."""
+    def retune(self, rope_length: FloatArray, growth: FloatArray, wet: FloatArray) -> None:
+        """Go on with other ropes and loads, as by ``HoistBatch.retune``."""
         if self._hoists is not None:
-            self._observer.retune(self._hoists.retune(rope_length, growth))
+            self._observer.retune(self._hoists.retune(rope_length, growth, wet))
             self._regulator = self._hoists.regulator(self._tuned)
 
     @property

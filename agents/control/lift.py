@@ -40,7 +40,7 @@ class Unweighed(NamedTuple):
     """Mass that bobs on the rope beyond that which its tension at rest would weigh in air, and the rope's strain."""
 
     fixed: float
-    """ρ V + m_a, kg."""
+    """ρ V + m_a, kg, of a load that is all under water."""
     by_length: float
     """μ / 3 - w / g for each metre of rope below the pulley, kg/m."""
     drum_part: float
@@ -50,6 +50,16 @@ class Unweighed(NamedTuple):
     have never reckoned with."""
     slowness: float
     """√(μ / E F), time of a wave for each metre of rope, s/m."""
+
+
+def share_under_water(lift: Lift, below: float) -> float:
+    """Share of the load that is under water with ``below`` m of rope below the pulley, ship and water at rest.
+
+    1 without water, which carries nothing then.
+    """
+    if lift.water is None:
+        return 1.0
+    return lift.load.share_under_water(lift.water.surface_level - lift.crane.pulley_position[2] + below)
 
 
 def unweighed(lift: Lift) -> Unweighed:

@@ -25,17 +25,19 @@ from agents.control.winch import WinchModel
 from agents.policy import FloatArray, Knowledge, Policy
 
 RETUNE_AT: Final = 0.05
-"""Change of a rope's length, as a share of it, after which a policy is tuned to it anew."""
+"""Change of a rope's length, as a share of it, or of the share of the load under water, after which a policy is tuned
+anew."""
 BLIND: Final = (Knowledge.NOTHING, Knowledge.CLOCK)
 """What policies know that look at no readings, and so may be put beside any."""
 
 
 @runtime_checkable
 class Retunable(Protocol):
-    """A policy that can go on with a rope of another length without forgetting the waves."""
+    """A policy that can go on with a rope of another length, and a load that gets wet, without forgetting the waves."""
 
-    def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
-        """Reckon with ropes of ``rope_length`` (N,) m that weigh ``growth`` (N,) N more than at the start."""
+    def retune(self, rope_length: FloatArray, growth: FloatArray, wet: FloatArray) -> None:
+        """Reckon with ropes of ``rope_length`` (N,) m that bear ``growth`` (N,) N more than at the start, and with
+        loads of which shares ``wet`` (N,) are under water."""
         ...
 
 
@@ -48,6 +50,8 @@ class Planned(NamedTuple):
     """At the pulley, N."""
     rate: float
     """Velocity of the load, m/s."""
+    wet: float
+    """Share of the load that is under water, waves apart."""
     heave: float
     """Height of the pulley above its place at the start, the ship at rest, m."""
     heave_rate: float
@@ -58,12 +62,12 @@ class Planned(NamedTuple):
 
 @dataclass(frozen=True)
 class PayOut:
-    """Plan of one row: the load under water all the way, at rest or lowered so evenly that only drag holds it up."""
+    """Plan of one row: the load at rest in still water, or lowered so evenly that only drag holds it up."""
 
     scenario: Scenario
     """Only what a ``Lift`` has is looked at, and the ways of target and frame."""
     weight: float
-    """Of the load in its water, N."""
+    """Of the load where it hangs at the start, N, less what water it is in there carries."""
 
     @classmethod
     def weighed(cls, scenario: Scenario, tension: float) -> PayOut:
@@ -90,21 +94,36 @@ class PayOut:
                 float(swing.pulley_velocity[0, 2]),
                 float(swing.pulley_acceleration[0, 2]),
             )
-        below, drum_part = self._lengths(self.scenario.target_level + change, rate, crane)
-        weight, rope_weight = self._pull(rate)
-        return Planned(below + drum_part, weight + rope_weight * below, rate, *heave)
+        level = self.scenario.target_level + change
+        below, drum_part = self._lengths(level, rate, crane)
+        weight, rope_weight = self._pull(level, rate)
+        return Planned(below + drum_part, weight + rope_weight * below, rate, self.wet(level), *heave)
+
+    def wet(self, level: float) -> float:
+        """Share of the load that is under still water at a level [m]."""
+        water = self.scenario.water
+        return 1.0 if water is None else self.scenario.load.share_under_water(water.surface_level - level)
+
+    @property
+    def buoyancy(self) -> float:
+        """What the water carries of the load when all of it is wet, N."""
+        return self.scenario.density * self.scenario.load.volume * self.scenario.gravity
+
+    def weight_at(self, level: float) -> float:
+        """Weight of the load at a level [m], N, less what the water carries there."""
+        return self.weight + (self.wet(self.scenario.target_level) - self.wet(level)) * self.buoyancy
 
     def _lengths(self, level: float, rate: float, crane: Crane) -> tuple[float, float]:
-        weight, rope_weight = self._pull(rate)
+        weight, rope_weight = self._pull(level, rate)
         length = crane.pulley_position[2] - level
         return heavy_lengths(length, crane.drum_to_pulley, weight, crane.rope.axial_stiffness, rope_weight)
 
-    def _pull(self, rate: float) -> tuple[float, float]:
-        """Weight of the load [N] and of a metre of rope [N/m], with their drag at a velocity of ``rate`` m/s."""
+    def _pull(self, level: float, rate: float) -> tuple[float, float]:
+        """Weight of the load [N] at a level [m] and of a metre of rope [N/m], with their drag at a ``rate`` [m/s]."""
         scenario, rope = self.scenario, self.scenario.crane.rope
         pressure = 0.5 * scenario.density * abs(rate) * rate
         along = pressure * rope.tangential_drag * math.pi * rope.solid_diameter if rope.mass_per_length else 0.0
-        load = self.weight + pressure * scenario.load.drag_area_vertical
+        load = self.weight_at(level) + pressure * self.wet(level) * scenario.load.drag_area_vertical
         return max(load, LEAST_WEIGHT), scenario.rope_weight + along
 
 
@@ -123,10 +142,10 @@ class Following:
     _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
     _period: float = field(init=False, repr=False, default=0.1)
     _plans: list[PayOut] = field(init=False, repr=False, default_factory=list)
-    _first: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
-    """(N,) m and N, of the plans at the start."""
-    _tuned: FloatArray = field(init=False, repr=False)
-    """(N,) m that the policy is tuned to."""
+    _first: tuple[FloatArray, FloatArray, FloatArray] = field(init=False, repr=False)
+    """(N,) m, N and shares under water, of the plans at the start."""
+    _tuned: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
+    """(N,) m, and shares under water, that the policy is tuned to."""
     _paid_out: FloatArray = field(init=False, repr=False)
     """(N,) m since the start, by the encoder."""
     _angle: FloatArray = field(init=False, repr=False)
@@ -159,11 +178,11 @@ class Following:
         if not self._plans:
             self._start(o, columns)
         then = time - (0.0 if self.sensors is None else self.sensors.delay)
-        length, tension, rate, *heaves = self._planned(then)
+        length, tension, rate, _, *heaves = self._planned(then)
         for name, heave in zip(("pulley_heave", "pulley_velocity_z", "pulley_acceleration_z"), heaves, strict=True):
             if name in columns:
                 o[:, columns[name]] -= heave
-        now, later = self._planned(time)[0], self._planned(time + self._period)[0]
+        (now, _, _, wet, *_), later = self._planned(time), self._planned(time + self._period)[0]
         angle = o[:, columns["drum_angle"]].copy()
         self._paid_out += self._drum_radius() * (angle - self._angle)
         self._angle, actual = angle, self._drum_radius()
@@ -181,10 +200,12 @@ class Following:
             o[:, columns["rope_length"]] = length
             speed = (self._planned(then + 0.05)[0] - self._planned(then - 0.05)[0]) / 0.1
             o[:, columns["drum_speed"]] = (o[:, columns["drum_speed"]] * actual - speed) / self._radius
-        if np.any(abs(now / self._tuned - 1.0) > RETUNE_AT) and isinstance(self.policy, Retunable):
+        changed = np.maximum(abs(now / self._tuned[0] - 1.0), abs(wet - self._tuned[1]))
+        if np.any(changed > RETUNE_AT) and isinstance(self.policy, Retunable):
             rope_weight = np.array([scenario.rope_weight for scenario in self._scenarios])
-            self.policy.retune(now, rope_weight * (now - self._first[0]))
-            self._tuned = now
+            lighter = np.array([plan.buoyancy for plan in self._plans]) * (wet - self._first[2])
+            self.policy.retune(now, rope_weight * (now - self._first[0]) - lighter, wet)
+            self._tuned = now, wet
         turn = self._deviating.turn(self.policy.act(o.astype(np.float32), time))
         command, _ = self._drums.command((self._radius * turn + later - now) / actual)
         return command
@@ -192,8 +213,8 @@ class Following:
     def _start(self, o: FloatArray, columns: dict[str, int]) -> None:
         tension = o[:, columns["rope_tension"]].tolist()
         self._plans = [PayOut.weighed(s, each) for s, each in zip(self._scenarios, tension, strict=True)]
-        length, tensions, *_ = self._planned(0.0)
-        self._first, self._tuned = (length, tensions), length
+        length, tensions, _, wet, *_ = self._planned(0.0)
+        self._first, self._tuned = (length, tensions, wet), (length, wet)
         self._paid_out, self._angle = np.zeros(len(o)), o[:, columns["drum_angle"]].copy()
         cranes = [scenario.crane for scenario in self._scenarios]
         self._drums, self._deviating = WinchModel(len(o), self._period), WinchModel(len(o), self._period)
@@ -207,5 +228,5 @@ class Following:
         return np.array([s.crane.drum_radius(x) for s, x in zip(self._scenarios, length.tolist(), strict=True)])
 
     def _planned(self, time: float) -> FloatArray:
-        """What a ``Planned`` holds by the plans of all rows: (6, N)."""
+        """What a ``Planned`` holds by the plans of all rows: (7, N)."""
         return np.array([plan.at(max(time, 0.0)) for plan in self._plans]).T

@@ -291,7 +291,7 @@ def drag_rate(scenario: Scenario, velocity: FloatArray) -> float:
         return 0.0
     mean = float(np.sum(abs(velocity) ** 3)) / square
     # A change of the velocity meets twice the drag that the velocity itself does.
-    return 2.0 * drag_of(scenario, scenario.lengths[0]) * mean / scenario.moved_mass
+    return 2.0 * drag_of(scenario, scenario.lengths[0], 1.0) * mean / scenario.moved_mass
 
 
 def _rope_model(scenario: Scenario, period: float, drag: float = 0.0) -> FloatArray:

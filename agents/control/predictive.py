@@ -129,9 +129,9 @@ class Planner:
         self._tune(rows)
         return o
 
-    def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
-        """Go on with other ropes, as by ``HoistBatch.retune``."""
-        self._observer.retune(self.hoists.retune(rope_length, growth))
+    def retune(self, rope_length: FloatArray, growth: FloatArray, wet: FloatArray) -> None:
+        """Go on with other ropes and loads, as by ``HoistBatch.retune``."""
+        self._observer.retune(self.hoists.retune(rope_length, growth, wet))
         self._tune(ALL)
 
     def _tune(self, rows: Rows) -> None:
@@ -300,10 +300,10 @@ class PredictiveControl:
         """Begin N episodes; of the scenarios only what a ``Lift`` has is looked at."""
         self._lifts, self._period, self._planner = scenarios, control_period, None
 
-    def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
-        """Go on with other ropes, as by ``HoistBatch.retune``."""
+    def retune(self, rope_length: FloatArray, growth: FloatArray, wet: FloatArray) -> None:
+        """Go on with other ropes and loads, as by ``HoistBatch.retune``."""
         if self._planner is not None:
-            self._planner.retune(rope_length, growth)
+            self._planner.retune(rope_length, growth, wet)
 
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for readings (N, 10), or observations (N, 14) of the full state."""

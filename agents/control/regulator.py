@@ -14,7 +14,7 @@ from aframe_env.task import SENSED, STATE, Quantity
 from aframe_env.validation import InvalidValue, require_number
 from agents.control.chain import Chains, Hanging
 from agents.control.filters import ALL, FloatArray, Rows
-from agents.control.lift import LEAST_WEIGHT, Lift, Unweighed, unweighed
+from agents.control.lift import LEAST_WEIGHT, Lift, Unweighed, share_under_water, unweighed
 from agents.control.rope import RopeModel
 from agents.control.winch import WinchModel
 
@@ -94,6 +94,7 @@ class HoistBatch:
         on the ropes, the same with a light rope in air; ``frequency`` of the bobbing, rad/s."""
         self.rope_length = np.ones(rows)
         """(N,) m of unstretched rope that all of this is for."""
+        self._wet = np.ones(rows)
         self._least_effort = np.zeros(rows)
         self._drum_radius = np.ones(rows)
         self._unweighed = np.zeros((len(Unweighed._fields), rows))
@@ -115,25 +116,28 @@ class HoistBatch:
         lengths = o["rope_length"].tolist()
         self._drum_radius[rows] = [lift.crane.drum_radius(x) for lift, x in zip(lifts, lengths, strict=True)]
         self._unweighed[:, rows] = np.array([unweighed(lift) for lift in lifts]).T
-        self._tune(o["rope_length"], self._weight[rows], rows)
+        below = (o["rope_length"] - self._unweighed[2, rows]).tolist()
+        wet = [share_under_water(lift, x) for lift, x in zip(lifts, below, strict=True)]
+        self._tune(o["rope_length"], self._weight[rows], np.array(wet), rows)
         return o
 
-    def retune(self, rope_length: FloatArray, growth: FloatArray) -> FloatArray:
-        """Reckon from now on with ropes of ``rope_length`` (N,) m that weigh ``growth`` (N,) N more than at the start.
+    def retune(self, rope_length: FloatArray, growth: FloatArray, wet: FloatArray) -> FloatArray:
+        """Reckon from now on with ropes of ``rope_length`` (N,) m that bear ``growth`` (N,) N more than at the start,
+        at rest, and with loads of which shares ``wet`` (N,) are under water.
 
         Tensions are read less that growth. Return by what factor the ropes are longer than before, (N,).
         """
         longer = rope_length / self.rope_length
-        self._tune(rope_length, self._weight + growth, ALL)
+        self._tune(rope_length, self._weight + growth, wet, ALL)
         return np.asarray(longer)
 
-    def _tune(self, rope_length: FloatArray, weight: FloatArray, rows: Rows) -> None:
-        self.rope_length[rows] = rope_length
+    def _tune(self, rope_length: FloatArray, weight: FloatArray, wet: FloatArray, rows: Rows) -> None:
+        self.rope_length[rows], self._wet[rows] = rope_length, wet
         self.weighed[rows] = weight / GRAVITY
         fixed, by_length, drum_part, softness, slowness = self._unweighed[:, rows]
         below = rope_length - drum_part
         # A pin that reads less than the rope alone weighs must not make a mass of less than nothing.
-        moved = self.weighed[rows] + (fixed + by_length * below)
+        moved = self.weighed[rows] + (wet * fixed + by_length * below)
         self.mass[rows] = np.maximum(moved, LEAST_WEIGHT / GRAVITY)
         self.winch.radius[rows] = self._drum_radius[rows] * (1.0 + softness * weight)
         self.frequency[rows] = np.sqrt(self._axial_stiffness[rows] / (rope_length * self.mass[rows]))
@@ -157,7 +161,8 @@ class HoistBatch:
 
     def chains(self, rows: Rows = ALL) -> Chains:
         """The same with the ropes' mass and the water's drag."""
-        each = zip(self._lifts[rows], self.rope_length[rows].tolist(), self.mass[rows].tolist(), strict=True)
+        known = (self.rope_length, self.mass, self._wet)
+        each = zip(self._lifts[rows], *(column[rows].tolist() for column in known), strict=True)
         return Chains.of([Hanging.weighed(*one) for one in each], self.period)
 
     def regulator(self, gains: Gains) -> Regulator:

@@ -146,7 +146,8 @@ class SettingDown:
     def _start(self, tension: FloatArray) -> None:
         plans = [PayOut.weighed(s, each) for s, each in zip(self._scenarios, tension.tolist(), strict=True)]
         ends = [plan.at(plan.scenario.target_path.duration if plan.scenario.target_path else 0.0) for plan in plans]
-        weights = np.array([plan.weight for plan in plans])
+        changes = [s.target_path.corners[-1][1] if s.target_path else 0.0 for s in self._scenarios]
+        weights = np.array([p.weight_at(p.scenario.target_level + x) for p, x in zip(plans, changes, strict=True)])
         down = np.array([told is not true for told, true in zip(self._told, self._scenarios, strict=True)])
         self._from = np.array([way_down(s.target_path)[-1][0] if s.target_path else 0.0 for s in self._scenarios])
         self._least = np.where(down, np.array([end.tension for end in ends]) - BORNE * weights, -np.inf)

@@ -71,10 +71,10 @@ class RealTimeMapPolicy:
         """Begin N episodes; of the scenarios only what a ``Lift`` has is looked at."""
         self._scenarios, self._period, self._hoists = scenarios, control_period, None
 
-    def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
-        """Go on with other ropes, as by ``HoistBatch.retune``."""
+    def retune(self, rope_length: FloatArray, growth: FloatArray, wet: FloatArray) -> None:
+        """Go on with other ropes and loads, as by ``HoistBatch.retune``."""
         if self._hoists is not None:
-            self._hoists.retune(rope_length, growth)
+            self._hoists.retune(rope_length, growth, wet)
 
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for readings (N, 10), or observations (N, 14) of the full state.

@@ -65,10 +65,10 @@ class OnFeatures(ABC):
             inputs = self._features.advance(observation)
         return self._features.command(self._finite_output(inputs))
 
-    def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
-        """Go on with ropes of ``rope_length`` (N,) m that weigh ``growth`` (N,) N more than at the start."""
+    def retune(self, rope_length: FloatArray, growth: FloatArray, wet: FloatArray) -> None:
+        """Go on with other ropes and loads, as by ``HoistBatch.retune``."""
         if self._features is not None:
-            self._features.retune(rope_length, growth)
+            self._features.retune(rope_length, growth, wet)
 
     def overrule(self, command: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Look on while somebody else gives the commands (N,) rad/s in place of those of the last ``act``.

@@ -127,9 +127,9 @@ class Features:
         self._observer.start(o, rows)
         return self._look(o, rows)
 
-    def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
-        """Go on with other ropes, as by ``HoistBatch.retune``."""
-        self._observer.retune(self._hoists.retune(rope_length, growth))
+    def retune(self, rope_length: FloatArray, growth: FloatArray, wet: FloatArray) -> None:
+        """Go on with other ropes and loads, as by ``HoistBatch.retune``."""
+        self._observer.retune(self._hoists.retune(rope_length, growth, wet))
 
     def advance(self, observation: Observation) -> Float32Array:
         """Features (N, F) of all rows, whose observations (N, K) are one control step later."""

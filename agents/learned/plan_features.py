@@ -78,9 +78,9 @@ class PlanFeatures:
         self._take(self._planner.start(observation, lifts, rows), rows)
         return self._look()[rows]
 
-    def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
-        """Go on with other ropes, as by ``HoistBatch.retune``."""
-        self._planner.retune(rope_length, growth)
+    def retune(self, rope_length: FloatArray, growth: FloatArray, wet: FloatArray) -> None:
+        """Go on with other ropes and loads, as by ``HoistBatch.retune``."""
+        self._planner.retune(rope_length, growth, wet)
 
     def advance(self, observation: Observation) -> Float32Array:
         """Features (N, F) of all rows, whose observations (N, K) are one control step later."""

@@ -114,10 +114,10 @@ class RecurrentPolicy:
             raise InvalidValue(f"{self.name} gave an output that is not finite: must be in [-1, 1]")
         return self._lookout.command(share)
 
-    def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
-        """Go on with ropes of ``rope_length`` (N,) m that weigh ``growth`` (N,) N more than at the start."""
+    def retune(self, rope_length: FloatArray, growth: FloatArray, wet: FloatArray) -> None:
+        """Go on with other ropes and loads, as by ``HoistBatch.retune``."""
         if self._lookout is not None:
-            self._lookout.retune(rope_length, growth)
+            self._lookout.retune(rope_length, growth, wet)
 
     def _share(self, lookout: Lookout, outlook: Outlook) -> FloatArray:
         # In blocks of one size: how a matrix product is summed depends on its shape, and a row must not on the others.

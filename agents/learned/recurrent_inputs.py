@@ -182,9 +182,9 @@ class Lookout:
         self._tune(o)
         return self._look(observation, o, np.zeros(len(observation)))
 
-    def retune(self, rope_length: FloatArray, growth: FloatArray) -> None:
-        """Go on with other ropes, as by ``HoistBatch.retune``."""
-        self._observer.retune(self._hoists.retune(rope_length, growth))
+    def retune(self, rope_length: FloatArray, growth: FloatArray, wet: FloatArray) -> None:
+        """Go on with other ropes and loads, as by ``HoistBatch.retune``."""
+        self._observer.retune(self._hoists.retune(rope_length, growth, wet))
         self._tune({"rope_length": rope_length, "pulley_heave": np.zeros(len(rope_length))})
 
     def _tune(self, o: Columns) -> None:

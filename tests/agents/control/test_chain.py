@@ -101,10 +101,12 @@ def test_what_is_weighed_on_board_is_what_hangs():
         water=Water(),
         load=load,
     )
-    true, known = Hanging.of(scenario), Hanging.weighed(scenario, scenario.free_length, scenario.moved_mass)
+    true, known = Hanging.of(scenario), Hanging.weighed(scenario, scenario.free_length, scenario.moved_mass, 1.0)
     assert known[1:] == pytest.approx(true[1:], rel=5e-3)
     assert true.inertia == 108e3
-    nothing = Chains.of([Hanging.weighed(scenario, 5.0, 0.0), Hanging.weighed(scenario, 2000.0, 100.0)], PERIOD)
+    nothing = Chains.of(
+        [Hanging.weighed(scenario, 5.0, 0.0, 1.0), Hanging.weighed(scenario, 2000.0, 100.0, 1.0)], PERIOD
+    )
     assert np.isfinite(nothing.transition).all()
     assert np.abs(np.linalg.eigvals(nothing.transition[:, :, :-1])).max() < 1.0 + 1e-9
 
