@@ -21,7 +21,9 @@ from aframe_env import (
     Vessel,
     Water,
     Winch,
+    find_task,
 )
+from aframe_env.config import TaskConfig
 from aframe_env.scenario.target import TargetPath
 from aframe_env.validation import InvalidValue
 from agents.control.feedback import Feedback
@@ -117,6 +119,46 @@ def test_the_plan_is_the_rope_at_rest() -> None:
     assert plan.at(0.0).length == pytest.approx(HEAVY.free_length, abs=1e-6)
     assert plan.at(60.0).length == pytest.approx(below.free_length, abs=1e-6)
     assert plan.at(60.0).tension == pytest.approx(below.hanging_weight, rel=1e-9)
+
+
+THROUGH = replace(
+    HEAVY,
+    target_level=-2.0,  # 3 m above the water
+    target_path=TargetPath.lowering(-12.0, 0.5, start=5.0, corner_time=0.01),
+    load=replace(HEAVY.load, height=4.0),
+)
+
+
+@pytest.mark.parametrize("depth", [-3.0, -1.0, 0.0, 1.5, 6.0])
+def test_the_plan_has_as_much_of_the_load_wet_as_hangs_in_the_water(depth: float) -> None:
+    there = replace(THROUGH, target_level=THROUGH.water.surface_level - depth, target_path=None)  # type: ignore[union-attr]
+    now = 5.0 + (THROUGH.target_level - there.target_level) / 0.5
+    planned = PayOut.weighed(THROUGH, THROUGH.hanging_weight).at(now)
+    drag = 0.5 * 1025.0 * 0.5**2 * 20.0 * (there.share_under_water if now > 5.0 else 0.0)
+    assert planned.wet == there.share_under_water
+    assert planned.length == pytest.approx(there.free_length, abs=1e-3)
+    assert planned.tension == pytest.approx(there.hanging_weight - drag, abs=20.0)  # drag of 10 m of rope beside
+
+
+def test_a_policy_is_tuned_to_a_load_that_gets_wet() -> None:
+    policy = Feedback(None)
+    for seconds, level in ((1.0, THROUGH.target_level), (60.0, THROUGH.target_level - 12.0)):
+        run(Following(policy), [THROUGH], episode_duration=seconds)
+        rope = THROUGH.crane.rope.mass_per_length * (THROUGH.crane.pulley_position[2] - level) / 3.0
+        wet = 3e4 if seconds == 60.0 else 0.0
+        assert policy._hoists is not None
+        assert policy._hoists.mass[0] == pytest.approx(THROUGH.load_mass + wet + rope, rel=2e-3)
+
+
+def test_predictive_control_does_not_shake_a_load_above_the_water() -> None:
+    """Taken for wet there it would be thought half as quick as it is, and be driven on until the rope hangs slack."""
+    task = find_task("Splash")
+    config = TaskConfig(**task.arguments)
+    assert config.sensors
+    scenarios = task.scenarios("validation", 4)
+    policy = Following(PredictiveControl(PlanningConfig(sensors=config.sensors)), config.sensors)
+    episodes = run(policy, scenarios, config, episode_duration=15.0)
+    assert not episodes.slack_events.any()
 
 
 def test_sensors_go_with_a_policy_on_sensors() -> None:

@@ -272,7 +272,7 @@ def test_other_ropes_retune_it():
     lookout, longer = Lookout(2, LookoutConfig(waves=WAVES)), Lookout(2, LookoutConfig(waves=WAVES))
     lookout.start(seen, scenarios)
     before = lookout.gains
-    lookout.retune(np.full(2, 800.0), np.zeros(2))
+    lookout.retune(np.full(2, 800.0), np.zeros(2), np.ones(2))
     seen[:, 13] = 800.0
     longer.start(seen, scenarios)
     assert lookout.gains == pytest.approx(longer.gains)
