@@ -149,16 +149,8 @@ def _law(make: Callable[[Sensors, ExpectedWaves], Policy]) -> PolicySpec:
 
 def _predictive(name: str, sensed: bool, adapts: bool = False) -> PolicySpec:
     def build(context: BuildContext) -> Policy:
-        sensors, horizon, light = context.sensors if sensed else None, PlanningConfig.horizon, context.nominal.is_light
-        if sensors is not None and sensors.preview is not None:
-            horizon = PREVIEW_HORIZON
-        elif not light:
-            horizon = SLOW_HORIZON
-        return PredictiveControl(
-            PlanningConfig(
-                sensors=sensors, horizon=horizon, waves=context.waves, adapts=adapts, chains=sensed and not light
-            )
-        )
+        sensors, light = context.sensors if sensed else None, context.nominal.is_light
+        return PredictiveControl(PlanningConfig.of(sensors, context.waves, light=light, adapts=adapts))
 
     return PolicySpec(name, build)
 
@@ -174,12 +166,6 @@ def _output_zero(observation: Literal["state", "sensors"], name: str) -> PolicyS
     return PolicySpec(name, build)
 
 
-SLOW_HORIZON: Final = 80
-"""Control steps that predictive control plans on a heavy rope, whose load bobs slowly. Against the 50 of light ropes it
-has 2 points more of the mean share, and 10 of that in the worst cases, on 40 validation scenarios of DeepRope."""
-PREVIEW_HORIZON: Final = 100
-"""Control steps that predictive control plans where a wave radar foretells the heave. Against 50 it has 0.6 points more
-of the mean share, and 0.3 less of that in the worst cases, on 40 validation scenarios of Preview; 150 give nothing."""
 DRUM_STILL: Final = PolicySpec("drum still", _drum_still)
 OPTIMUM: Final = PolicySpec("winch-limited optimum", _optimum)
 REGISTRY: Final[dict[str, PolicySpec]] = {

@@ -18,6 +18,7 @@ from safetensors.torch import save as save_tensors
 
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.serialization import strict_converter, structure
+from aframe_env.suite import find_task
 from aframe_env.validation import InvalidValue
 from agents import cards, shipped
 from agents.control.expected_waves import ExpectedWaves
@@ -57,6 +58,12 @@ class AgentCard:
     """sha256 of the file of weights."""
     squashed: bool = False
     """True if the action passes through tanh instead of being clipped."""
+    task: str = ""
+    """What it was trained on: id of a task of the suite; empty for other scenarios."""
+    adapts: bool = False
+    """As in ``FeatureConfig``."""
+    light: bool = True
+    """As in ``FeatureConfig``."""
     format: int = FORMAT
 
     @property
@@ -68,7 +75,16 @@ class AgentCard:
             waves=self.waves,
             action=self.action,
             winch=self.action != "predictive" and WINCH_FEATURES[-1] in self.features,
+            adapts=self.adapts,
+            light=self.light,
         )
+
+    @property
+    def name(self) -> str:
+        """Name of the agent, as in "predictive PPO on sensors, trained on Storm"."""
+        sensed = self.observation != "state"
+        trained_on = f", trained on {find_task(self.task).name}" if self.task else ""
+        return f"{self.algorithm} on sensors{trained_on}" if sensed else f"{self.algorithm}{trained_on}"
 
 
 @dataclass
@@ -81,11 +97,7 @@ class LearnedPolicy(OnFeatures):
     knows: Knowledge = field(init=False)
 
     def __post_init__(self) -> None:
-        sensed = self.card.observation != "state"
-        super().__init__(
-            f"{self.card.algorithm} on sensors" if sensed else self.card.algorithm,
-            self.card.made_for,
-        )
+        super().__init__(self.card.name, self.card.made_for)
         expected = feature_names(self.card.made_for)
         if self.card.features != expected:
             raise InvalidValue(f"the agent's features are {self.card.features}, this version makes {expected}")
@@ -189,5 +201,7 @@ def output_zero(config: FeatureConfig) -> LearnedPolicy:
         timesteps=0,
         versions={},
         sha256=digest(serialise(actor)),
+        adapts=config.adapts,
+        light=config.light,
     )
     return LearnedPolicy(actor, card)

@@ -25,6 +25,7 @@ from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue, require_choice
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.filters import ALL, FloatArray, Rows
+from agents.control.lateness import require_readings
 from agents.control.lift import Lift
 from agents.control.observer import observer_for
 from agents.control.regulator import Columns, HoistBatch, Observation
@@ -79,12 +80,21 @@ class FeatureConfig:
     drum's speed, as a share of the winch's; "predictive": it corrects what predictive control plans."""
     winch: bool = False
     """Append ``WINCH_FEATURES``, for winches that differ; the features of predictive control have its limits anyway."""
+    adapts: bool = False
+    """With the predictive action on sensors: what is corrected is adaptive predictive control, which reckons how much
+    later than told readings and winch are."""
+    light: bool = True
+    """Whether the lifts are light, as ``Scenario.is_light`` says; what is planned on others looks further ahead, and on
+    sensors reckons with the rope's mass and the water's drag."""
 
     def __post_init__(self) -> None:
-        require_action(self.action, self.winch)
+        require_action(self.action, self.winch, self.adapts)
+        require_readings(self.adapts, self.sensors)
 
     @classmethod
-    def of(cls, task: TaskConfig, action: Action = "residual", *, winch: bool = False) -> FeatureConfig:
+    def of(
+        cls, task: TaskConfig, action: Action = "residual", *, winch: bool = False, adapts: bool = False
+    ) -> FeatureConfig:
         """For the agents of a task."""
         return cls(
             control_period=task.control_period,
@@ -92,6 +102,8 @@ class FeatureConfig:
             waves=ExpectedWaves.of(task.source),
             action=action,
             winch=winch,
+            adapts=adapts,
+            light=task.nominal.is_light,
         )
 
     @property
@@ -100,9 +112,11 @@ class FeatureConfig:
         return (STATE_FEATURES if self.sensors is None else SENSED_FEATURES) + WINCH_FEATURES * self.winch
 
 
-def require_action(action: Action, winch: bool) -> None:
-    """Raise where there is no such action, or it does not go with the ``winch`` as features."""
+def require_action(action: Action, winch: bool, adapts: bool) -> None:
+    """Raise where there is no such action, or it does not go with the ``winch`` as features or a base that adapts."""
     require_choice("action", action, ACTIONS)
+    if adapts and action != "predictive":
+        raise InvalidValue(f"adapts = True: what adapts is predictive control, and action = {action!r}: must be False")
     if winch and action == "predictive":
         raise InvalidValue("winch = True: the features of predictive control have its limits already: must be False")
 

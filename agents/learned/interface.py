@@ -49,11 +49,13 @@ class InterfaceConfig:
     none."""
     winch: bool = False
     """As in ``FeatureConfig``."""
+    adapts: bool = False
+    """As in ``FeatureConfig``."""
     privileged: bool = False
     """Append, where sensors are observed, the features of the full state, for critics alone."""
 
     def __post_init__(self) -> None:
-        require_action(self.action, self.winch)
+        require_action(self.action, self.winch, self.adapts)
         require_choice("reward", self.reward, REWARDS)
         require_number("reward_scale", self.reward_scale, "1/m", low=0.0, high=1e6, low_open=True)
         if self.reward_knee != math.inf:
@@ -92,7 +94,7 @@ class LearnerFeatures:
         """``privileged``: as in ``InterfaceConfig``."""
         self._features = features_for(rows, config)
         self._privileged = (
-            Features(rows, replace(config, sensors=None, action="residual", winch=False))
+            Features(rows, replace(config, sensors=None, action="residual", winch=False, adapts=False))
             if privileged and config.sensors
             else None
         )

@@ -70,7 +70,8 @@ class PlanFeatures:
         self.rows = rows
         self._knows_state = config.sensors is None
         self._weight = np.ones(rows)
-        self._planner = Planner(rows, config.control_period, PlanningConfig(sensors=config.sensors, waves=config.waves))
+        planning = PlanningConfig.of(config.sensors, config.waves, light=config.light, adapts=config.adapts)
+        self._planner = Planner(rows, config.control_period, planning)
         self._heave, self._length, self._planned = np.zeros((3, rows))
 
     def start(self, observation: Observation, lifts: Sequence[Lift], rows: Rows = ALL) -> Float32Array:

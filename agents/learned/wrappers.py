@@ -201,7 +201,7 @@ def _bare(env: gymnasium.Env[Any, Any] | VectorEnv[Any, Any, Any], kind: type[Fa
 
 
 def _features(simulation: Simulation, config: InterfaceConfig) -> LearnerFeatures:
-    made_for = FeatureConfig.of(simulation.config, config.action, winch=config.winch)
+    made_for = FeatureConfig.of(simulation.config, config.action, winch=config.winch, adapts=config.adapts)
     return LearnerFeatures(simulation.rows, made_for, privileged=config.privileged)
 
 

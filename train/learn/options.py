@@ -131,10 +131,15 @@ class LearningOptions(RunOptions, Where):
             observation=self.observation,
         )
 
+    @property
+    def adapts(self) -> bool:
+        """Whether the predictive control that is corrected adapts: on a task's sensors, for on each it does better."""
+        return self.task is not None and self.action == "predictive" and self.observation == "sensors"
+
     @cached_property
     def features(self) -> FeatureConfig:
         """What the agent's features are made for."""
-        return FeatureConfig.of(self.config, self.action, winch=self.winch)
+        return FeatureConfig.of(self.config, self.action, winch=self.winch, adapts=self.adapts)
 
     @property
     def width(self) -> int:
@@ -147,6 +152,7 @@ class LearningOptions(RunOptions, Where):
         return InterfaceConfig(
             action=self.action,
             winch=self.winch,
+            adapts=self.adapts,
             reward_scale=self.reward_scale,
             reward_knee=self.reward_knee,
             drift_limit=self.drift_limit,

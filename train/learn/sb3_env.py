@@ -77,7 +77,7 @@ class TrainingVecEnv(VecEnv):
         self._no_infos: list[dict[str, Any]] = [{} for _ in range(rows)]
         self._features = LearnerFeatures(
             rows,
-            FeatureConfig.of(simulation.config, interface.action, winch=interface.winch),
+            FeatureConfig.of(simulation.config, interface.action, winch=interface.winch, adapts=interface.adapts),
             privileged=interface.privileged,
         )
         self._cuts = Cuts(rows, simulation.control_period, simulation.episode_duration, interface)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
+from aframe_env.suite import find_task
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, serialise
 from agents.learned.feature_sets import feature_names
 from agents.learned.features import Action
@@ -48,6 +49,9 @@ def _policy(actor: Actor, learner: Learner, options: LearningOptions, timesteps:
         timesteps=timesteps,
         versions=versions(),
         sha256=digest(weights),
+        task="" if options.task is None else find_task(options.task).id,
+        adapts=options.features.adapts,
+        light=options.features.light,
     )
     return LearnedPolicy(actor, card), weights
 

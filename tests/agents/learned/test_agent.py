@@ -65,6 +65,26 @@ def test_an_agent_that_was_told_the_winch_says_so_by_its_features(tmp_path):
     assert np.array_equal(one.error, other.error)
 
 
+def test_an_agent_that_was_trained_on_a_task_says_so_by_its_name_and_plans_as_it_did_there(tmp_path):
+    policy, weights = agent("sensors", action="predictive")
+    write(tmp_path, policy, weights, task="AFrameHeave-DeepRope-v0", adapts=True, light=False)
+    back = load(tmp_path)
+    assert policy.name == "PPO on sensors"
+    assert back.name == "PPO on sensors, trained on DeepRope"
+    assert (back.card.made_for.adapts, back.card.made_for.light) == (True, False)
+    assert (policy.card.made_for.adapts, policy.card.made_for.light) == (False, True)
+
+
+def test_a_card_from_before_there_were_tasks_means_what_it_did(tmp_path):
+    policy, weights = agent("sensors", action="predictive")
+    (tmp_path / WEIGHTS).write_bytes(weights)
+    card = json.loads(card_text(policy.card))
+    for name in (cards.DIGEST, "task", "adapts", "light"):
+        del card[name]
+    (tmp_path / CARD).write_text(json.dumps(cards.sealed(card)))
+    assert load(tmp_path).card == policy.card
+
+
 @pytest.mark.parametrize("action", ACTIONS)
 @pytest.mark.parametrize("observation", ["state", "sensors"])
 def test_an_agent_comes_back_from_its_folder_as_it_was(observation, action, tmp_path):
@@ -92,6 +112,7 @@ def test_an_agent_comes_back_from_its_folder_as_it_was(observation, action, tmp_
         ({"hidden": "8"}, r"\[hidden\] '8': must be of type int"),
         ({"hidden": 9}, "not the weights of the network"),
         ({"surprise": 1}, "unknown key 'surprise'"),
+        ({"task": "Calm"}, "task = 'Calm': must be one of"),
         ({"features": [f"x{i}" for i in range(len(STATE_FEATURES))]}, "the agent's features are"),
     ],
 )

@@ -1,15 +1,17 @@
 import numpy as np
 import pytest
 
-from aframe_env import Crane, ScenarioDistribution, Winch
+from aframe_env import Crane, InvalidValue, ScenarioDistribution, Winch
 from aframe_env.config import TaskConfig
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.simulation import Simulation
+from aframe_env.suite import find_task
 from aframe_env.task import DRUM_ANGLE
 from agents.control.predictive import PlanningConfig, PredictiveControl
 from agents.learned.agent import output_zero
 from agents.learned.features import LIMIT, FeatureConfig
 from agents.learned.plan_features import PLAN_FEATURES, PlanFeatures
+from agents.registry import BuildContext, choose
 from agents.rollout import held_out_scenarios, run
 
 WEAK = Crane(winch=Winch(max_rope_speed=1.0, max_rope_acceleration=0.6))
@@ -39,6 +41,27 @@ def test_an_output_of_zero_is_predictive_control(sensors):
     silent = run(output_zero(config), scenarios, task)
     np.testing.assert_array_equal(silent.drum_speed, run(law, scenarios, task).drum_speed)
     assert (abs(silent.drum_speed) > 0.1).any()
+
+
+@pytest.mark.parametrize("name", ["MRU", "DeepRope", "Preview"])
+def test_on_a_tasks_sensors_an_output_of_zero_is_adaptive_predictive_control(name):
+    """With the delays that it finds out, the filter for heavy ropes, the radar's heave, and the task's waves."""
+    task = find_task(name)
+    scenarios, config = task.scenarios("train", 3), TaskConfig(**task.arguments).replaced(episode_duration=15.0)
+    law = choose("adaptive predictive control").policy(BuildContext(scenarios=scenarios, config=config))
+    expected = run(law, scenarios, config).drum_speed
+    silent = run(output_zero(FeatureConfig.of(config, "predictive", adapts=True)), scenarios, config)
+    np.testing.assert_array_equal(silent.drum_speed, expected)
+    assert (abs(expected) > 0.1).any()
+    told = run(output_zero(FeatureConfig.of(config, "predictive")), scenarios, config)
+    assert not np.array_equal(told.drum_speed, expected)
+
+
+def test_only_predictive_control_on_sensors_adapts():
+    with pytest.raises(InvalidValue, match="action = 'residual': must be False"):
+        FeatureConfig(sensors=Sensors(), adapts=True)
+    with pytest.raises(InvalidValue, match="the full state is observed: must be False"):
+        FeatureConfig(action="predictive", adapts=True)
 
 
 @pytest.mark.parametrize("observation", ["state", "sensors"])
