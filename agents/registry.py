@@ -27,7 +27,7 @@ from agents import shipped
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.feedback import Feedback
 from agents.control.inverse_dynamics import InverseDynamics
-from agents.control.lowering import BLIND, Following
+from agents.control.lowering import BLIND, Following, moves
 from agents.control.optimum import CommandSequence, optimise
 from agents.control.predictive import PlanningConfig, PredictiveControl
 from agents.control.set_down import SettingDown, lands
@@ -106,8 +106,7 @@ class PolicySpec:
         And where the target ends on the seabed it leaves the load there, if it has readings to tell that by.
         """
         policy = self.build(context)
-        moves = any(s.target_path or s.luffing for s in context.scenarios)
-        if isinstance(policy, DrivePolicy | CommandSequence) or not moves:
+        if isinstance(policy, DrivePolicy | CommandSequence) or not any(map(moves, context.scenarios)):
             return policy
         blind = policy.knows in BLIND
         sensors = context.config.sensors if blind else context.sensors if policy.knows is Knowledge.SENSORS else None

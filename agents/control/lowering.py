@@ -19,6 +19,7 @@ from aframe_env.scenario import Crane, Scenario
 from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue
+from agents.control.filters import ALL, Rows
 from agents.control.lift import LEAST_WEIGHT
 from agents.control.regulator import Observation
 from agents.control.winch import WinchModel
@@ -58,6 +59,16 @@ class Planned(NamedTuple):
     """m/s."""
     heave_acceleration: float
     """m/s²."""
+
+
+def moves(scenario: Scenario) -> bool:
+    """Whether target or frame move."""
+    return scenario.target_path is not None or scenario.luffing is not None
+
+
+def at_rest(scenario: Scenario) -> Scenario:
+    """The scenario as a policy is told it that does not know the frame to move."""
+    return replace(scenario, luffing=None) if scenario.luffing else scenario
 
 
 @dataclass(frozen=True)
@@ -127,6 +138,101 @@ class PayOut:
         return max(load, LEAST_WEIGHT), scenario.rope_weight + along
 
 
+class Ways:
+    """Ways of N loads that run in step: observations and drum commands, as they are and as deviations from the ways."""
+
+    def __init__(self, rows: int, control_period: float, sensors: Sensors | None) -> None:
+        """``sensors`` that make the observations, for their delay; None for the full state."""
+        self._period, self._sensors = control_period, sensors
+        self._columns = {q.name: i for i, q in enumerate(STATE if sensors is None else SENSED)}
+        self._scenarios = np.empty(rows, dtype=object)
+        self._weight = np.zeros(rows)
+        """(N,) N, as ``PayOut`` has it."""
+        self._first = np.zeros((2, rows))
+        """Length [m] and tension [N] of the plans at the start."""
+        self._buoyancy, self._first_wet = np.zeros((2, rows))
+        """(N,) N, as ``PayOut`` has it, and share of the loads that was under water at the start."""
+        self._tuned = np.zeros((2, rows))
+        """Length [m], and share of the load under water, that the policy is tuned to."""
+        self._paid_out, self._angle = np.zeros((2, rows))
+        """(N,) m since the start, by the encoder, and rad that it read last."""
+        self._radius, self._actual = np.zeros((2, rows))
+        """(N,) m, of the drums that the policy knows, and as they are now."""
+        self._now, self._wet, self._later = np.zeros((3, rows))
+        """(N,) m and shares under water of the plans now, and m after a control step."""
+        self._drums, self._deviating = WinchModel(rows, control_period), WinchModel(rows, control_period)
+        """``_deviating``: drums that turn as the policy commands."""
+
+    def start(self, scenarios: Sequence[Scenario], observation: Observation, rows: Rows = ALL) -> Observation:
+        """Begin ways in these rows; return what the policy sees of the first observations (n, K)."""
+        tension = observation[:, self._columns["rope_tension"]].astype(np.float64).tolist()
+        plans = [PayOut.weighed(s, each) for s, each in zip(scenarios, tension, strict=True)]
+        self._scenarios[rows], self._weight[rows] = scenarios, [plan.weight for plan in plans]
+        self._buoyancy[rows] = [plan.buoyancy for plan in plans]
+        length, tensions, _, wet, *_ = self._planned(0.0, rows)
+        self._first[:, rows], self._tuned[:, rows], self._first_wet[rows] = (length, tensions), (length, wet), wet
+        self._paid_out[rows], self._angle[rows] = 0.0, observation[:, self._columns["drum_angle"]].astype(np.float64)
+        for drums in (self._drums, self._deviating):
+            drums.start([scenario.crane for scenario in scenarios], rows)
+        self._radius[rows] = self._drum_radius(rows)
+        return self.seen(observation, 0.0, rows)
+
+    def seen(self, observation: Observation, time: FloatArray | float, rows: Rows = ALL) -> Observation:
+        """What the policy sees of the observations (n, K) of these rows, ``time`` (n,) s after their starts."""
+        o, columns = observation.astype(np.float64), self._columns
+        then = time - (0.0 if self._sensors is None else self._sensors.delay)
+        length, tension, rate, _, *heaves = self._planned(then, rows)
+        for name, heave in zip(("pulley_heave", "pulley_velocity_z", "pulley_acceleration_z"), heaves, strict=True):
+            if name in columns:
+                o[:, columns[name]] -= heave
+        self._now[rows], _, _, self._wet[rows], *_ = self._planned(time, rows)
+        self._later[rows] = self._planned(time + self._period, rows)[0]
+        angle, radius = o[:, columns["drum_angle"]].copy(), self._radius[rows]
+        self._paid_out[rows] += self._drum_radius(rows) * (angle - self._angle[rows])
+        self._angle[rows], self._actual[rows] = angle, self._drum_radius(rows)
+        actual = self._actual[rows]
+        o[:, columns["drum_angle"]] = (self._paid_out[rows] - (length - self._first[0, rows])) / radius
+        o[:, columns["rope_tension"]] -= tension - self._first[1, rows]
+        if self._sensors is None:
+            o[:, columns["load_velocity_z"]] -= rate
+            # On another radius a drum that turns as far in a step ends it at another speed: the policy is told that of
+            # its own, and by how much the real one missed what was reckoned.
+            real = o[:, columns["drum_speed"]].copy()
+            self._deviating.speed[rows] += (real - self._drums.speed[rows]) * actual / radius
+            self._drums.speed[rows] = real
+            o[:, columns["drum_speed"]] = self._deviating.speed[rows]
+        else:
+            o[:, columns["rope_length"]] = length
+            speed = (self._planned(then + 0.05, rows)[0] - self._planned(then - 0.05, rows)[0]) / 0.1
+            o[:, columns["drum_speed"]] = (o[:, columns["drum_speed"]] * actual - speed) / radius
+        return o.astype(np.float32)
+
+    def retune(self, policy: Retunable) -> None:
+        """Tune the policy to ropes and loads as they are planned now, if one has become another one."""
+        changed = np.maximum(abs(self._now / self._tuned[0] - 1.0), abs(self._wet - self._tuned[1]))
+        if np.any(changed > RETUNE_AT):
+            rope_weight = np.array([scenario.rope_weight for scenario in self._scenarios])
+            lighter = self._buoyancy * (self._wet - self._first_wet)
+            policy.retune(self._now.copy(), rope_weight * (self._now - self._first[0]) - lighter, self._wet.copy())
+            self._tuned = np.array([self._now, self._wet])
+
+    def command(self, command: FloatArray) -> FloatArray:
+        """Drum speed commands (N,) rad/s for those of the policy, for what it saw last."""
+        turn = self._deviating.turn(command)
+        return self._drums.command((self._radius * turn + self._later - self._now) / self._actual)[0]
+
+    def _drum_radius(self, rows: Rows) -> FloatArray:
+        """Radius (n,) m at which the ropes run off the drums."""
+        length = (self._first[0, rows] + self._paid_out[rows]).tolist()
+        return np.array([s.crane.drum_radius(x) for s, x in zip(self._scenarios[rows], length, strict=True)])
+
+    def _planned(self, time: FloatArray | float, rows: Rows) -> FloatArray:
+        """What a ``Planned`` holds by the plans of these rows at ``time`` (n,) s after their starts: (7, n)."""
+        scenarios, weights = self._scenarios[rows], self._weight[rows].tolist()
+        times = np.maximum(np.broadcast_to(time, len(weights)), 0.0).tolist()
+        return np.array([PayOut(s, w).at(t) for s, w, t in zip(scenarios, weights, times, strict=True)]).T
+
+
 @dataclass
 class Following:
     """Let ``policy`` follow the ``target_path`` and the ``luffing`` of its scenarios.
@@ -141,20 +247,7 @@ class Following:
     knows: Knowledge = field(init=False)
     _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
     _period: float = field(init=False, repr=False, default=0.1)
-    _plans: list[PayOut] = field(init=False, repr=False, default_factory=list)
-    _first: tuple[FloatArray, FloatArray, FloatArray] = field(init=False, repr=False)
-    """(N,) m, N and shares under water, of the plans at the start."""
-    _tuned: tuple[FloatArray, FloatArray] = field(init=False, repr=False)
-    """(N,) m, and shares under water, that the policy is tuned to."""
-    _paid_out: FloatArray = field(init=False, repr=False)
-    """(N,) m since the start, by the encoder."""
-    _angle: FloatArray = field(init=False, repr=False)
-    """(N,) rad that it read last."""
-    _radius: FloatArray = field(init=False, repr=False)
-    """(N,) m, of the drums that the policy knows."""
-    _drums: WinchModel = field(init=False, repr=False)
-    _deviating: WinchModel = field(init=False, repr=False)
-    """Drums that turn as the policy commands."""
+    _ways: Ways | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         self.name, self.knows = f"{self.policy.name}, following", self.policy.knows
@@ -166,67 +259,18 @@ class Following:
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes; of the scenarios only what a ``Lift`` has and the ways of target and frame count."""
-        at_rest = [replace(scenario, luffing=None) if scenario.luffing else scenario for scenario in scenarios]
+        resting = list(map(at_rest, scenarios))
         knows_pulley = self.policy.knows is Knowledge.FUTURE
-        self._scenarios, self._period, self._plans = at_rest if knows_pulley else scenarios, control_period, []
-        self.policy.reset(scenarios if knows_pulley else at_rest, control_period)
+        self._scenarios, self._period, self._ways = resting if knows_pulley else scenarios, control_period, None
+        self.policy.reset(scenarios if knows_pulley else resting, control_period)
 
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for observations (N, K)."""
-        o = observation.astype(np.float64)
-        columns = {q.name: i for i, q in enumerate(STATE if self.sensors is None else SENSED)}
-        if not self._plans:
-            self._start(o, columns)
-        then = time - (0.0 if self.sensors is None else self.sensors.delay)
-        length, tension, rate, _, *heaves = self._planned(then)
-        for name, heave in zip(("pulley_heave", "pulley_velocity_z", "pulley_acceleration_z"), heaves, strict=True):
-            if name in columns:
-                o[:, columns[name]] -= heave
-        (now, _, _, wet, *_), later = self._planned(time), self._planned(time + self._period)[0]
-        angle = o[:, columns["drum_angle"]].copy()
-        self._paid_out += self._drum_radius() * (angle - self._angle)
-        self._angle, actual = angle, self._drum_radius()
-        o[:, columns["drum_angle"]] = (self._paid_out - (length - self._first[0])) / self._radius
-        o[:, columns["rope_tension"]] -= tension - self._first[1]
-        if self.sensors is None:
-            o[:, columns["load_velocity_z"]] -= rate
-            # On another radius a drum that turns as far in a step ends it at another speed: the policy is told that of
-            # its own, and by how much the real one missed what was reckoned.
-            real = o[:, columns["drum_speed"]].copy()
-            self._deviating.speed += (real - self._drums.speed) * actual / self._radius
-            self._drums.speed = real
-            o[:, columns["drum_speed"]] = self._deviating.speed
+        if self._ways is None:
+            self._ways = Ways(len(observation), self._period, self.sensors)
+            seen = self._ways.start(self._scenarios, observation)
         else:
-            o[:, columns["rope_length"]] = length
-            speed = (self._planned(then + 0.05)[0] - self._planned(then - 0.05)[0]) / 0.1
-            o[:, columns["drum_speed"]] = (o[:, columns["drum_speed"]] * actual - speed) / self._radius
-        changed = np.maximum(abs(now / self._tuned[0] - 1.0), abs(wet - self._tuned[1]))
-        if np.any(changed > RETUNE_AT) and isinstance(self.policy, Retunable):
-            rope_weight = np.array([scenario.rope_weight for scenario in self._scenarios])
-            lighter = np.array([plan.buoyancy for plan in self._plans]) * (wet - self._first[2])
-            self.policy.retune(now, rope_weight * (now - self._first[0]) - lighter, wet)
-            self._tuned = now, wet
-        turn = self._deviating.turn(self.policy.act(o.astype(np.float32), time))
-        command, _ = self._drums.command((self._radius * turn + later - now) / actual)
-        return command
-
-    def _start(self, o: FloatArray, columns: dict[str, int]) -> None:
-        tension = o[:, columns["rope_tension"]].tolist()
-        self._plans = [PayOut.weighed(s, each) for s, each in zip(self._scenarios, tension, strict=True)]
-        length, tensions, _, wet, *_ = self._planned(0.0)
-        self._first, self._tuned = (length, tensions, wet), (length, wet)
-        self._paid_out, self._angle = np.zeros(len(o)), o[:, columns["drum_angle"]].copy()
-        cranes = [scenario.crane for scenario in self._scenarios]
-        self._drums, self._deviating = WinchModel(len(o), self._period), WinchModel(len(o), self._period)
-        self._drums.start(cranes)
-        self._deviating.start(cranes)
-        self._radius = self._drum_radius()
-
-    def _drum_radius(self) -> FloatArray:
-        """Radius (N,) m at which the ropes run off the drums."""
-        length = self._first[0] + self._paid_out
-        return np.array([s.crane.drum_radius(x) for s, x in zip(self._scenarios, length.tolist(), strict=True)])
-
-    def _planned(self, time: float) -> FloatArray:
-        """What a ``Planned`` holds by the plans of all rows: (7, N)."""
-        return np.array([plan.at(max(time, 0.0)) for plan in self._plans]).T
+            seen = self._ways.seen(observation, time)
+        if isinstance(self.policy, Retunable):
+            self._ways.retune(self.policy)
+        return self._ways.command(self.policy.act(seen, time))

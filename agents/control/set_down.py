@@ -13,9 +13,10 @@ from typing import Final
 
 import numpy as np
 
-from aframe_env.scenario import Crane, Scenario, TargetPath
+from aframe_env.scenario import Crane, Scenario, Sensors, TargetPath
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue
+from agents.control.filters import ALL, Rows
 from agents.control.lowering import BLIND, Following, PayOut
 from agents.control.regulator import Observation
 from agents.policy import FloatArray, Knowledge
@@ -80,6 +81,84 @@ def _to_level_zero(crane: Crane) -> float:
     return crane.drum_to_pulley + crane.pulley_position[2]
 
 
+class SetDown:
+    """The setting down of N loads that run in step: what those who follow their targets see, and what they command."""
+
+    def __init__(self, rows: int, control_period: float, sensors: Sensors | None) -> None:
+        """``sensors`` that make the observations, for their delay; None for the full state."""
+        self._period, self._delay = control_period, 0.0 if sensors is None else sensors.delay
+        columns = [q.name for q in (STATE if sensors is None else SENSED)]
+        self._tension, self._depth_error = columns.index("rope_tension"), columns.index("depth_error")
+        self._scenarios, self._told = np.empty((2, rows), dtype=object)
+        """The loads' scenarios, and as those who follow them are told: other ones where the load lands."""
+        self._most = np.zeros(rows)
+        """(N,) greatest speeds of the drums, rad/s."""
+        self._least = np.zeros(rows)
+        """(N,) tension at the pulley below which a load has landed, N; -inf where none does."""
+        self._from = np.zeros(rows)
+        """(N,) time of arrival, before which a slack rope is no sign of it, s."""
+        self._slack = np.zeros(rows)
+        """(N,) rad to be paid out then."""
+        self._left = np.full(rows, np.nan)
+        """(N,) rad still to be paid out; NaN before the load has landed."""
+
+    def start(self, scenarios: Sequence[Scenario], observation: Observation, rows: Rows = ALL) -> Observation:
+        """Begin in these rows; return what is seen of the first observations (n, K)."""
+        told = list(map(told_of, scenarios))
+        tension = observation[:, self._tension].astype(np.float64).tolist()
+        self._scenarios[rows], self._told[rows] = scenarios, told
+        self._most[rows] = [scenario.crane.winch.max_speed for scenario in scenarios]
+        plans = [PayOut.weighed(s, each) for s, each in zip(scenarios, tension, strict=True)]
+        ends = [plan.at(plan.scenario.target_path.duration if plan.scenario.target_path else 0.0) for plan in plans]
+        changes = [s.target_path.corners[-1][1] if s.target_path else 0.0 for s in scenarios]
+        weights = np.array([p.weight_at(p.scenario.target_level + x) for p, x in zip(plans, changes, strict=True)])
+        down = np.array([other is not true for other, true in zip(told, scenarios, strict=True)])
+        self._from[rows] = [way_down(s.target_path)[-1][0] if s.target_path else 0.0 for s in scenarios]
+        self._least[rows] = np.where(down, np.array([end.tension for end in ends]) - BORNE * weights, -np.inf)
+        stiffness = np.array([scenario.crane.rope.axial_stiffness for scenario in scenarios])
+        stretch = weights * np.array([end.length for end in ends]) / stiffness
+        ways = [[_to_level_zero(crane) for crane in scenario.cranes] for scenario in scenarios]
+        rise = np.array([max(way) - min(way) for way in ways])
+        radius = [s.crane.drum_radius(end.length) for s, end in zip(scenarios, ends, strict=True)]
+        self._slack[rows] = (stretch + SLACK + rise) / np.array(radius)
+        self._left[rows] = np.nan
+        return self.seen(observation, 0.0, rows)
+
+    def seen(self, observation: Observation, time: FloatArray | float, rows: Rows = ALL) -> Observation:
+        """What is seen of the observations (n, K) of these rows, ``time`` (n,) s after their starts."""
+        left, tension = self._left[rows], observation[:, self._tension].astype(np.float64)
+        landed = np.isnan(left) & (tension < self._least[rows]) & (time >= self._from[rows])
+        self._left[rows] = np.where(landed, self._slack[rows], left)
+        seen = observation.copy()
+        seen[:, self._depth_error] += self._above(time - self._delay, rows)
+        return seen
+
+    def command(self, command: FloatArray) -> FloatArray:
+        """Drum speed commands (N,) rad/s for those of who follows the targets."""
+        leaving = np.minimum(self._most, self._left / self._period)
+        self._left = self._left - self._period * leaving
+        return np.asarray(np.where(np.isnan(leaving), command, leaving))
+
+    def _above(self, time: FloatArray | float, rows: Rows) -> FloatArray:
+        """(n,) m that the targets are above those that are told."""
+        true, told = self._scenarios[rows].tolist(), self._told[rows].tolist()
+        times = np.broadcast_to(time, len(true)).tolist()
+        return np.asarray(_targets(true, times) - _targets(told, times))
+
+
+def told_of(scenario: Scenario) -> Scenario:
+    """The scenario as who follows its target is told it: where the load lands, the target goes on into the ground."""
+    if not lands(scenario):
+        return scenario
+    return into_the_ground(scenario, 2.0 * SLACK + STRETCH * scenario.rope_length)
+
+
+def _targets(scenarios: Sequence[Scenario], times: Sequence[float]) -> FloatArray:
+    """(n,) m that the targets are above where they were at the start."""
+    paths = [scenario.target_path for scenario in scenarios]
+    return np.array([0.0 if path is None else path.at(time)[0] for path, time in zip(paths, times, strict=True)])
+
+
 @dataclass
 class SettingDown:
     """Let a policy that follows its targets leave those loads on the ground that land on it."""
@@ -88,19 +167,8 @@ class SettingDown:
     name: str = field(init=False)
     knows: Knowledge = field(init=False)
     _scenarios: Sequence[Scenario] = field(init=False, repr=False, default=())
-    _told: Sequence[Scenario] = field(init=False, repr=False, default=())
-    """The same as the policy is told them: other ones where the load lands."""
-    _most: FloatArray = field(init=False, repr=False)
-    """(N,) greatest speeds of the drums, rad/s."""
     _period: float = field(init=False, repr=False, default=0.1)
-    _least: FloatArray = field(init=False, repr=False)
-    """(N,) tension at the pulley below which a load has landed, N; -inf where none does."""
-    _from: FloatArray = field(init=False, repr=False)
-    """(N,) time of arrival, before which a slack rope is no sign of it, s."""
-    _slack: FloatArray = field(init=False, repr=False)
-    """(N,) rad to be paid out then."""
-    _left: FloatArray = field(init=False, repr=False)
-    """(N,) rad still to be paid out; NaN before the load has landed."""
+    _rows: SetDown | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         self.name, self.knows = f"{self.policy.name}, setting down", self.policy.knows
@@ -112,49 +180,14 @@ class SettingDown:
 
     def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
         """Begin N episodes; of the scenarios only what a ``Lift`` has, target and seabed count."""
-        self._scenarios, self._period = scenarios, control_period
-        self._told = [into_the_ground(s, 2.0 * SLACK + STRETCH * s.rope_length) if lands(s) else s for s in scenarios]
-        self._most = np.array([scenario.crane.winch.max_speed for scenario in scenarios])
-        self._least = np.zeros(0)
-        self.policy.reset(self._told, control_period)
+        self._scenarios, self._period, self._rows = scenarios, control_period, None
+        self.policy.reset(list(map(told_of, scenarios)), control_period)
 
     def act(self, observation: Observation, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for observations (N, K)."""
-        sensors = self.policy.sensors
-        columns = [q.name for q in (STATE if sensors is None else SENSED)]
-        tension = observation[:, columns.index("rope_tension")].astype(np.float64)
-        if not len(self._least):
-            self._start(tension)
-        landed = np.isnan(self._left) & (tension < self._least) & (time >= self._from)
-        self._left[landed] = self._slack[landed]
-        then = time - (0.0 if sensors is None else sensors.delay)
-        seen = observation.copy()
-        seen[:, columns.index("depth_error")] += self._above(then)
-        command = self.policy.act(seen, time)
-        leaving = np.minimum(self._most, self._left / self._period)
-        self._left -= self._period * leaving
-        return np.asarray(np.where(np.isnan(leaving), command, leaving))
-
-    def _above(self, time: float) -> FloatArray:
-        """(N,) m that the targets are above those that the policy is told."""
-        true, told = (
-            np.array([0.0 if s.target_path is None else s.target_path.at(time)[0] for s in scenarios])
-            for scenarios in (self._scenarios, self._told)
-        )
-        return np.asarray(true - told)
-
-    def _start(self, tension: FloatArray) -> None:
-        plans = [PayOut.weighed(s, each) for s, each in zip(self._scenarios, tension.tolist(), strict=True)]
-        ends = [plan.at(plan.scenario.target_path.duration if plan.scenario.target_path else 0.0) for plan in plans]
-        changes = [s.target_path.corners[-1][1] if s.target_path else 0.0 for s in self._scenarios]
-        weights = np.array([p.weight_at(p.scenario.target_level + x) for p, x in zip(plans, changes, strict=True)])
-        down = np.array([told is not true for told, true in zip(self._told, self._scenarios, strict=True)])
-        self._from = np.array([way_down(s.target_path)[-1][0] if s.target_path else 0.0 for s in self._scenarios])
-        self._least = np.where(down, np.array([end.tension for end in ends]) - BORNE * weights, -np.inf)
-        stiffness = np.array([scenario.crane.rope.axial_stiffness for scenario in self._scenarios])
-        stretch = weights * np.array([end.length for end in ends]) / stiffness
-        ways = [[_to_level_zero(crane) for crane in scenario.cranes] for scenario in self._scenarios]
-        rise = np.array([max(way) - min(way) for way in ways])
-        radius = [s.crane.drum_radius(end.length) for s, end in zip(self._scenarios, ends, strict=True)]
-        self._slack = (stretch + SLACK + rise) / np.array(radius)
-        self._left = np.full(len(tension), np.nan)
+        if self._rows is None:
+            self._rows = SetDown(len(observation), self._period, self.policy.sensors)
+            seen = self._rows.start(self._scenarios, observation)
+        else:
+            seen = self._rows.seen(observation, time)
+        return self._rows.command(self.policy.act(seen, time))

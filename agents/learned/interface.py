@@ -16,12 +16,15 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario
 from aframe_env.validation import require_choice, require_known, require_number
 from agents.control.filters import ALL, FloatArray, Rows
+from agents.control.lowering import moves
 from agents.control.regulator import Observation
 from agents.learned.feature_sets import features_for
-from agents.learned.features import STATE_FEATURES, Action, FeatureConfig, Features, require_action
+from agents.learned.features import STATE_FEATURES, Action, FeatureConfig, require_action
+from agents.learned.following import FollowingFeatures
 
 Float32Array = npt.NDArray[np.float32]
 
@@ -90,11 +93,12 @@ def shaped(xp: Any, mean_square: Any, scale: float, knee: float) -> Any:
 class LearnerFeatures:
     """Features of N rows as a learner observes them: the agent's, then those that are for critics alone."""
 
-    def __init__(self, rows: int, config: FeatureConfig, *, privileged: bool) -> None:
-        """``privileged``: as in ``InterfaceConfig``."""
-        self._features = features_for(rows, config)
+    def __init__(self, rows: int, config: FeatureConfig, *, privileged: bool, follow: bool = False) -> None:
+        """``privileged``: as in ``InterfaceConfig``; ``follow``: targets and frames that move."""
+        make = FollowingFeatures if follow else features_for
+        self._features = make(rows, config)
         self._privileged = (
-            Features(rows, replace(config, sensors=None, action="residual", winch=False, adapts=False))
+            make(rows, replace(config, sensors=None, action="residual", winch=False, adapts=False))
             if privileged and config.sensors
             else None
         )
@@ -106,6 +110,12 @@ class LearnerFeatures:
             self.names += tuple(f"true_{name}" for name in STATE_FEATURES)
         self.values = np.zeros((rows, len(self.names)), dtype=np.float32)
         """The present features (N, F), in place."""
+
+    @classmethod
+    def of(cls, task: TaskConfig, rows: int, config: InterfaceConfig) -> LearnerFeatures:
+        """For so many rows of a task; where its target or frame moves they are followed, as by an agent's policy."""
+        made_for = FeatureConfig.of(task, config.action, winch=config.winch, adapts=config.adapts)
+        return cls(rows, made_for, privileged=config.privileged, follow=moves(task.nominal))
 
     def start(
         self, observation: Observation, state: FloatArray, scenarios: Sequence[Scenario], rows: Rows = ALL

@@ -19,7 +19,7 @@ from aframe_env.simulation import Simulation
 from aframe_env.validation import InvalidValue, require_numbers
 from aframe_env.vector_env import AFrameHeaveVectorEnv
 from agents.control.filters import FloatArray
-from agents.learned.features import LIMIT, FeatureConfig
+from agents.learned.features import LIMIT
 from agents.learned.interface import Cuts, InterfaceConfig, LearnerFeatures, interface_config
 
 Float32Array = npt.NDArray[np.float32]
@@ -62,7 +62,7 @@ class AgentInterface(
         self._simulation = simulation = _bare(env, AFrameHeaveEnv).simulation
         self._config = interface_config(config, arguments)
         RecordConstructorArgs.__init__(self, **asdict(self._config))
-        self._features = _features(simulation, self._config)
+        self._features = LearnerFeatures.of(simulation.config, 1, self._config)
         self._cuts = Cuts(1, simulation.control_period, simulation.episode_duration, self._config)
         self.observation_space = _observation_space(self._features)  # type: ignore[assignment]
         self.action_space = _ACTION
@@ -109,7 +109,7 @@ class AgentVectorInterface(_Named, VectorWrapper):
         self._bare = _bare(env, AFrameHeaveVectorEnv)
         self._simulation = simulation = self._bare.simulation
         self._config = interface_config(config, arguments)
-        self._features = _features(simulation, self._config)
+        self._features = LearnerFeatures.of(simulation.config, self.num_envs, self._config)
         self._cuts = Cuts(self.num_envs, simulation.control_period, simulation.episode_duration, self._config)
         self._autoreset: AutoresetMode = self._bare.metadata["autoreset_mode"]
         self._stagger = stagger
@@ -198,11 +198,6 @@ def _bare(env: gymnasium.Env[Any, Any] | VectorEnv[Any, Any, Any], kind: type[Fa
     if env.observation_space != bare.observation_space or env.action_space != bare.action_space:
         raise InvalidValue(f"env = {env}: must leave observations and actions of {kind.__name__} as they are")
     return bare
-
-
-def _features(simulation: Simulation, config: InterfaceConfig) -> LearnerFeatures:
-    made_for = FeatureConfig.of(simulation.config, config.action, winch=config.winch, adapts=config.adapts)
-    return LearnerFeatures(simulation.rows, made_for, privileged=config.privileged)
 
 
 def _observation_space(features: LearnerFeatures) -> spaces.Box:

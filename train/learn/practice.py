@@ -20,7 +20,7 @@ from aframe_env.scenario import Scenario
 from agents.control.optimum import required_speeds, saturating
 from agents.learned.agent import output_zero
 from agents.learned.features import FeatureConfig
-from agents.policy import DrumStill
+from agents.registry import DRUM_STILL, BuildContext, as_spec
 from agents.rollout import drawn_scenarios, run
 
 FloatArray = npt.NDArray[np.float64]
@@ -57,8 +57,11 @@ class Practice:
     def of(cls, config: TaskConfig, features: FeatureConfig, count: int, seed: int) -> Practice:
         """Draw ``count`` scenarios of the task, and find what an agent of output zero leaves in them."""
         scenarios = half_saturating(config, SERIES + seed, count)
-        still = np.maximum(run(DrumStill(), scenarios, config).rms, 1e-6)
-        left = run(output_zero(features), scenarios, config).rms
+        context = BuildContext(scenarios=scenarios, config=config)
+        still, left = (
+            run(spec.policy(context), scenarios, config).rms for spec in (DRUM_STILL, as_spec(output_zero(features)))
+        )
+        still = np.maximum(still, 1e-6)
         # The slope of the mean share that is left, √(mean square) / still, over a scenario's mean square.
         slope = 1.0 / ((left + RESOLUTION * still) * still)
         weight = MEAN_REWARD / np.mean(left / still) * slope

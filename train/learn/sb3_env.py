@@ -19,7 +19,7 @@ from aframe_env import task
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario
 from aframe_env.simulation import RowState, Simulation
-from agents.learned.features import LIMIT, FeatureConfig
+from agents.learned.features import LIMIT
 from agents.learned.interface import Cuts, InterfaceConfig, LearnerFeatures
 from train.learn.memory import Memory, into_object, of_object
 from train.learn.options import LearningOptions
@@ -75,11 +75,7 @@ class TrainingVecEnv(VecEnv):
         """State of the generator before each row's scenario was drawn."""
         self._commands = np.zeros(rows)
         self._no_infos: list[dict[str, Any]] = [{} for _ in range(rows)]
-        self._features = LearnerFeatures(
-            rows,
-            FeatureConfig.of(simulation.config, interface.action, winch=interface.winch, adapts=interface.adapts),
-            privileged=interface.privileged,
-        )
+        self._features = LearnerFeatures.of(simulation.config, rows, interface)
         self._cuts = Cuts(rows, simulation.control_period, simulation.episode_duration, interface)
         told = practice.waves.shape[2] if practice else 0
         super().__init__(
@@ -200,6 +196,7 @@ class TrainingVecEnv(VecEnv):
 
     def recall(self, memory: Memory) -> None:
         """Put back what ``memory`` told of rows with the same options."""
+        simulation = self._simulation
         for name in _OWN:
             getattr(self, name)[:] = memory.arrays[name]
         self._drawn_from = list(memory.values["drawn_from"])
@@ -208,9 +205,12 @@ class TrainingVecEnv(VecEnv):
             if "noise" in memory.values:
                 seed, count = memory.values["noise"][i]
                 sensors = (*(memory.arrays[name][i] for name in _SENSED), seed, count)
-            mesh = self._simulation.config.mesh
-            self._simulation.write_row(i, RowState(self._scenario(i), engine, sensors, step, mesh))
+            mesh = simulation.config.mesh
+            simulation.write_row(i, RowState(self._scenario(i), engine, sensors, step, mesh))
         self._rng.bit_generator.state = memory.values["generator"]
+        # What a lift is stands in no memory: the features are told it anew.
+        scenarios = [scenario for scenario in simulation.scenarios if scenario is not None]
+        self._features.start(simulation.observe(), simulation.state, scenarios)
         into_object(self._features, memory.under("features"))
         into_object(self._cuts, memory.under("cuts"))
 

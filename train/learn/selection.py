@@ -12,7 +12,8 @@ import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
 from agents.learned.agent import LearnedPolicy
-from agents.policy import DrumStill
+from agents.policy import FloatArray
+from agents.registry import DRUM_STILL, BuildContext, PolicySpec, as_spec
 from agents.rollout import run
 from train.learn.learner import Learner
 from train.learn.options import LearningOptions
@@ -32,7 +33,8 @@ class KeepBest(BaseCallback):
         super().__init__()
         self._learner, self._options = learner, options
         self._scenarios = half_saturating(options.config, VALIDATION_SEED, options.selected_by)
-        self._still = np.maximum(run(DrumStill(), self._scenarios, options.config).rms, 1e-6)
+        self._task = BuildContext(scenarios=self._scenarios, config=options.config)
+        self._still = np.maximum(self._rms(DRUM_STILL), 1e-6)
         self._every = max(1, options.timesteps // LOOKS)
         self._looked = -1
 
@@ -54,8 +56,12 @@ class KeepBest(BaseCallback):
 
     def _look(self) -> None:
         policy: LearnedPolicy = to_policy(self._learner, self._options)[0]
-        left = float(np.mean(run(policy, self._scenarios, self._options.config).rms / self._still))
+        left = float(np.mean(self._rms(as_spec(policy)) / self._still))
         self.logger.record("selection/heave_left", left)
         best = self._learner.best
         if left < best.left:
             best.left, best.timesteps, best.actor = left, self.num_timesteps, policy.actor
+
+    def _rms(self, spec: PolicySpec) -> FloatArray:
+        """What a policy leaves (N,) m, as it is compared: made to follow a target that moves."""
+        return run(spec.policy(self._task), self._scenarios, self._task.config).rms

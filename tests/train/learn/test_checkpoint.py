@@ -37,6 +37,10 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
         {**PPO, "observation": "sensors", "practice": 0, "selected_by": 0, "critic_first": 2},
     ),
     "ppo, predictive": ("ppo-predictive", {**PPO, "practice": 4, "selected_by": 0, "horizon": 4.0}),
+    "ppo, predictive, on Landing's sensors": (
+        "ppo-predictive",
+        {**PPO, "observation": "sensors", "task": "Landing", "practice": 2, "selected_by": 2, "horizon": 4.0},
+    ),
     "ppo of rsl_rl": ("ppo-rsl", {**PPO, "device": "cpu", "drift_limit": 0.5, "selected_by": 2}),
     "sac": ("sac", SAC),
     "sac on sensors, speed": ("sac", {**SAC, "observation": "sensors", "action": "speed", "n_steps": 2}),

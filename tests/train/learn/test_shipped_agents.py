@@ -89,7 +89,7 @@ def test_an_agent_of_a_task_meets_its_row_of_the_leaderboard(folder):
     assert row.seeds == len(specs)
     shares = []
     for spec in specs:
-        policy = spec.build(BuildContext(scenarios=scenarios, config=config))
+        policy = spec.policy(BuildContext(scenarios=scenarios, config=config))
         ran = config.replaced(observation=observation_of(policy, config))
         left = run(policy, scenarios, ran, noise_seed=task.seed("test")).rms
         shares.append((1.0 - left / np.array(stored.still)) / stored.reductions)
