@@ -53,6 +53,13 @@ results: .venv/installed-test
 		"predictive control (state)" "predictive control" "feed-forward + feedback (state)" "feed-forward + feedback"
 	for task in storm unknown preview mru; do \
 		$(BIN)/python -m train.apg --task $$task --overwrite --out results/agents/apg-$$task/seed-0 || exit; done
+	for task in storm unknown deeprope preview mru splash landing; do \
+		$(BIN)/python -m train.ppo --task $$task --action predictive --observation sensors --timesteps 600000 --eval-scenarios 0 --overwrite --out results/agents/predictive-ppo-$$task/seed-0 || exit; done
+	$(BIN)/python -m train.sac --task storm --observation sensors --winch --eval-scenarios 0 --overwrite --out results/agents/sac-storm/seed-0
+	for task in unknown mru; do \
+		$(BIN)/python -m train.sac --task $$task --observation sensors --eval-scenarios 0 --overwrite --out results/agents/sac-$$task/seed-0 || exit; done
+	$(BIN)/python -m train.sac --task splash --observation sensors --horizon 60 --eval-scenarios 0 --overwrite --out results/agents/sac-splash/seed-0
+	$(BIN)/python -m train.sac --task landing --observation sensors --winch --horizon 60 --eval-scenarios 0 --overwrite --out results/agents/sac-landing/seed-0
 	$(BIN)/python -m train.apg --task deeprope --episodes 750 --labels 80000 --imitation-steps 1500 --updates 230 --look-every 25 --overwrite --out results/agents/apg-deeprope/seed-0
 	$(BIN)/python -m train.apg --task storm --observation state --overwrite --out results/agents/apg-state-storm/seed-0
 	$(BIN)/python -m train.benchmark --workers 1 --overwrite --out results/tasks

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -36,9 +37,11 @@ def test_a_scene_is_a_hard_scenario_and_no_freak(tmp_path):
 
 def test_an_agent_is_the_specialist_of_the_task_that_it_was_trained_on():
     found = {name: set(specialists(task)) for name, task in TASKS.items()}
-    assert set().union(*found.values()) == set(shipped.RECURRENT)
-    assert sum(map(len, found.values())) == len(shipped.RECURRENT)
-    assert found["Storm"] == {"apg-storm", "apg-state-storm"}
+    every = set().union(*found.values())
+    assert set(shipped.RECURRENT) <= every
+    assert sum(map(len, found.values())) == len(every)
+    assert {"apg-storm", "apg-state-storm"} <= found["Storm"]
+    assert not every & {"ppo", "ppo-sensors", "predictive-ppo-sensors", "sac-sensors"}
     assert specialists(TASKS["Storm"], "state") == ["apg-state-storm"]
     ours = [spec.text for spec in chosen_for(TASKS["Storm"], Options())]
     assert {"apg-storm", "apg-state-storm", "ppo-sensors", "predictive control"} <= {Path(text).name for text in ours}
@@ -46,6 +49,19 @@ def test_an_agent_is_the_specialist_of_the_task_that_it_was_trained_on():
     assert [spec.text for spec in chosen_for(TASKS["Storm"], Options(policies=("inverse dynamics",)))] == [
         "inverse dynamics"
     ]
+
+
+def test_an_agent_on_features_is_the_specialist_of_the_task_on_its_card(tmp_path, monkeypatch):
+    cards = {"ppo-storm": "AFrameHeave-Storm-v0", "ppo-mru": "AFrameHeave-MRU-v0", "ppo": "", "older": None}
+    for name, task in cards.items():
+        (tmp_path / name / "seed-0").mkdir(parents=True)
+        card = {"observation": "sensors"} | ({} if task is None else {"task": task})
+        (tmp_path / name / "seed-0" / "agent.json").write_text(json.dumps(card), encoding="utf-8")
+    monkeypatch.setattr(shipped, "AGENTS", {name: tmp_path / name for name in cards})
+    before = set(shipped.RECURRENT)
+    assert set(specialists(TASKS["Storm"])) - before == {"ppo-storm"}
+    assert set(specialists(TASKS["MRU"], "sensors")) - before == {"ppo-mru"}
+    assert set(specialists(TASKS["MRU"], "state")) - before == set()
 
 
 @pytest.mark.parametrize(

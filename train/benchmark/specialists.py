@@ -1,4 +1,4 @@
-"""The recurrent agents that the package brings for a task: each was trained on one."""
+"""The agents that the package brings for a task: each was trained on one."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ from typing import Literal
 from aframe_env.suite import Task
 from aframe_env.text import read_json
 from agents import shipped
-from agents.learned import recurrent
+from agents.learned import agent, recurrent
 
 
 def specialists(task: Task, observation: Literal["state", "sensors"] | None = None) -> list[str]:
     """Names of the agents that were trained on this task, on this observation or on either."""
     found = []
-    for name, folder in shipped.RECURRENT.items():
-        card = read_json(min(folder.glob(f"seed-*/{recurrent.CARD}")), "agent")
-        if card["task"] == task.id and observation in (None, card["observation"]):
-            found.append(name)
+    for folders, file in ((shipped.RECURRENT, recurrent.CARD), (shipped.AGENTS, agent.CARD)):
+        for name, folder in folders.items():
+            card = read_json(min(folder.glob(f"seed-*/{file}")), "agent")
+            # Cards from before agents said what they were trained on are those of the nominal task.
+            if card.get("task") == task.id and observation in (None, card["observation"]):
+                found.append(name)
     return found
