@@ -214,7 +214,7 @@ def test_outputs_that_are_none_are_refused(function, words):
         (lambda: AgentVectorInterface(gymnasium.make_vec(aframe_env.ENV_ID, 2, "sync")), "must be AFrameHeaveVector"),
         (
             lambda: AgentInterface(scalar(), drift=1.0),
-            "unexpected keyword argument 'drift': must be one of action, drift_limit",
+            "unexpected keyword argument 'drift': must be one of action, adapts, drift_limit",
         ),
         (lambda: AgentInterface(scalar(), drift_limit=0.0), r"drift_limit = 0.0 m: must be in \(0, 1000\] m"),
         (lambda: AgentInterface(scalar(), horizon=-1.0), r"horizon = -1.0 s"),
