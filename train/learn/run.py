@@ -44,6 +44,18 @@ METRICS: Final = "metrics.json"
 EVALUATED: Final = "comparison.json"
 
 
+def learning_progress(console: Console) -> Progress:
+    """Bars for ``ShowReduction``."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("heave reduction {task.fields[reduction]}"),
+        TimeRemainingColumn(),
+        console=console,
+    )
+
+
 class ShowReduction(BaseCallback):
     """Show progress and heave reduction while learning."""
 
@@ -222,18 +234,10 @@ def _learn(spec: LearnerSpec, options: LearningOptions, opened: Run, console: Co
             console.print("the checkpoint is of other versions: the agent may differ from that of one run")
     begin = time.perf_counter()
     stopped: Stopped | None = None
-    progress = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("heave reduction {task.fields[reduction]}"),
-        TimeRemainingColumn(),
-        console=console,
-    )
     with (
         stop_by_signal() as stop,
         open_logger(folder, options.log, to_mapping(options), begun) as logger,
-        progress,
+        learning_progress(console) as progress,
     ):
         model.set_logger(logger)
         keep = KeepCheckpoints(checkpoints, learner, options.checkpoint_every, stop)
