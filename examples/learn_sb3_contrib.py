@@ -15,7 +15,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
-import numpy as np
 import torch
 import tyro
 from sb3_contrib import TQC, RecurrentPPO
@@ -25,6 +24,7 @@ from torch import nn
 from aframe_env import Scenario, find_task
 from aframe_env.validation import InvalidValue, require_choice, require_integer
 from agents import FeatureConfig, FeaturePolicy
+from agents.learned.feature_policy import Float32Array
 from agents.policy import FloatArray
 from agents.registry import as_spec, choose
 from train.evaluate.run import run_on
@@ -104,6 +104,7 @@ def build(options: LearningOptions, rows: TrainingVecEnv) -> TQC | RecurrentPPO:
     )
     # Look for something better near the hand-written base, as SAC of the package does: by default the spread is 1.
     for layer, value in ((model.actor.mu, 0.0), (model.actor.log_std, -1.5)):
+        assert isinstance(layer, nn.Linear)
         nn.init.zeros_(layer.weight)
         nn.init.constant_(layer.bias, value)
     return model
@@ -113,7 +114,8 @@ class Played:
     """A trained model as a policy: its features' memory, and that of its LSTM if it has one, last an episode."""
 
     def __init__(self, model: BaseAlgorithm, config: FeatureConfig, name: str) -> None:
-        self._model, self._memory = model, None
+        self._model = model
+        self._memory: Any = None
         self._on_features = FeaturePolicy(self._output, config, name=name)
         self.name, self.knows = name, self._on_features.knows
 
@@ -122,11 +124,11 @@ class Played:
         self._memory = None
         self._on_features.reset(scenarios, control_period)
 
-    def act(self, observation: np.ndarray, time: float) -> FloatArray:
+    def act(self, observation: Float32Array, time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s for observations (N, K) at ``time`` s since the start."""
         return self._on_features.act(observation, time)
 
-    def _output(self, features: np.ndarray) -> np.ndarray:
+    def _output(self, features: Float32Array) -> Float32Array:
         output, self._memory = self._model.predict(features, state=self._memory, deterministic=True)
         return output
 

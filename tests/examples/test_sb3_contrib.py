@@ -116,3 +116,20 @@ def test_winches_are_told_where_they_differ() -> None:
 def test_a_folder_that_nothing_can_be_imported_from_is_refused(out: str) -> None:
     with pytest.raises(InvalidValue, match="named in letters, digits and _"):
         example.learn("tqc", Path(out))
+
+
+def test_an_interrupted_training_leaves_the_folder_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(example.ShowReduction, "_on_rollout_end", interrupt)
+    earlier = Path("runs/earlier/policy.py")
+    earlier.parent.mkdir(parents=True)
+    earlier.write_text("mine", "utf-8")
+    with pytest.raises(InvalidValue, match="exists and is not empty"):
+        example.learn("tqc", earlier.parent)
+    with pytest.raises(KeyboardInterrupt):
+        example.learn("tqc", earlier.parent, rows=4, overwrite=True)
+    assert list(earlier.parent.iterdir()) == [earlier]
+    assert earlier.read_text("utf-8") == "mine"
