@@ -40,6 +40,7 @@ from agents.drives.tuned import TUNED, Tuned, optimised, optimised_as_played
 from agents.learned import agent as learned
 from agents.learned import recurrent
 from agents.learned.features import FeatureConfig
+from agents.learned.foretelling import ForetellingControl
 from agents.policy import DrumStill, FloatArray, Knowledge, Policy
 
 
@@ -200,6 +201,12 @@ def _recurrent_agent(folder: Path) -> PolicySpec:
     return as_spec(recurrent.load(folder))
 
 
+def _on_forecasts(folder: Path) -> PolicySpec:
+    agent = recurrent.load(folder)
+    policy = ForetellingControl(agent.network, agent.card)
+    return PolicySpec(policy.name, lambda context: policy, control_period=agent.card.control_period)
+
+
 def _map_in_real_time(folder: Path) -> PolicySpec:
     stored = drive_map.load(folder)
     return _law(lambda sensors, waves: RealTimeMapPolicy(stored, sensors, waves))
@@ -217,7 +224,7 @@ def _map_by_the_clock(folder: Path) -> PolicySpec:
 
 FOLDERS: Final[dict[str, dict[str, Callable[[Path], PolicySpec]]]] = {
     learned.CARD: {"": _agent},
-    recurrent.CARD: {"": _recurrent_agent},
+    recurrent.CARD: {"": _recurrent_agent, "forecasts": _on_forecasts},
     drive_map.CARD: {"": _map_in_real_time, "state": _map_on_the_state, "clock": _map_by_the_clock},
 }
 """Loaders of policies from a folder, by the file that it must have, then by the word after a colon behind its path."""
@@ -232,16 +239,17 @@ def choose(text: str) -> PolicySpec:
     """Return the policy of that name in the registry (or the name's slug), folder, or ``module:function``.
 
     What is shipped goes by its name instead of its folder ("ppo-sensors", "drive-map"). A drive map is the map in real
-    time, on the sensors; with ``:state`` behind it that on the full state, with ``:clock`` the map by the clock.
+    time, on the sensors; with ``:state`` behind it that on the full state, with ``:clock`` the map by the clock. With
+    ``:forecasts`` behind a recurrent agent predictive control plans by what its memory foretells.
     """
     by_slug = {slug(name): spec for name, spec in REGISTRY.items()}
     if slug(text) in by_slug:
         return by_slug[slug(text)]
     if shipped.folder(text).is_dir():
         return _from_folder(shipped.folder(text))
-    before, colon, word = text.rpartition(":")
-    folder = shipped.folder(before)
-    kinds = _kinds_in(folder) if colon else {}
+    folder, word = _place(text)
+    folder = next(iter(learned.seeds(folder)), folder)
+    kinds = _kinds_in(folder) if word else {}
     if word in kinds:
         return _of_folder(folder, word)
     if kinds:
@@ -264,7 +272,7 @@ def choose_all(texts: Sequence[str]) -> list[PolicySpec]:
     """
     asked = {each: short for text in texts for each, short in _expanded(text).items()}
     specs = [replace(choose(text), text=short) for text, short in asked.items()]
-    for tell in (lambda text: Path(text).name.replace("-", " "), lambda text: text):
+    for tell in (lambda text: _place(text)[0].name.replace("-", " "), lambda text: text):
         names = [spec.name for spec in specs]
         specs = [
             replace(spec, name=f"{spec.name}, {tell(text)}") if names.count(spec.name) > 1 else spec
@@ -275,8 +283,17 @@ def choose_all(texts: Sequence[str]) -> list[PolicySpec]:
 
 def _expanded(text: str) -> dict[str, str]:
     """What a text stands for: texts of single policies, and for each the shortest one."""
-    folders = [str(path) for path in learned.seeds(shipped.folder(text))]
-    return {folder: folder if place else text for place, folder in enumerate(folders)} or {text: text}
+    place, word = _place(text)
+    folders = [f"{path}:{word}" if word else str(path) for path in learned.seeds(place)]
+    return {folder: folder if number else text for number, folder in enumerate(folders)} or {text: text}
+
+
+def _place(text: str) -> tuple[Path, str]:
+    """Folder that a text stands for, and the word behind its colon, if there is one."""
+    before, colon, word = text.rpartition(":")
+    if not colon or shipped.folder(text).is_dir():
+        return shipped.folder(text), ""
+    return shipped.folder(before), word
 
 
 def as_spec(policy: Policy) -> PolicySpec:

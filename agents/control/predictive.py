@@ -166,13 +166,19 @@ class Planner:
             self._previewed.take(observation)
         return o
 
-    def plan(self) -> Plan:
-        """The plan, as things stand."""
+    def plan(self, correction: FloatArray | None = None) -> Plan:
+        """The plan, as things stand.
+
+        ``correction`` (N, H) m/s of the pulley's mean speeds in the steps to come, as the wave bank foretells them.
+        """
         rises = self._observer.rises(self._config.horizon)
         if self._previewed is not None:
             foretold = self._previewed.rises(self._observer.waves, len(rises))
             rises[: len(foretold)] = foretold
-        return self.plan_for(self._observer.state(), rises.T / self.period, self.hoists.winch.speed)
+        pulley = rises.T / self.period
+        if correction is not None:
+            pulley = pulley + correction
+        return self.plan_for(self._observer.state(), pulley, self.hoists.winch.speed)
 
     def command(self, rope_speed: FloatArray) -> FloatArray:
         """Drum speed commands (N,) rad/s by which the drums pay out at a mean ``rope_speed`` (N,) m/s."""

@@ -29,7 +29,8 @@ from agents.policy import FloatArray, Knowledge
 FORMAT: Final = 1
 WEIGHTS: Final = "recurrent.safetensors"
 CARD: Final = "recurrent.json"
-_BLOCK: Final = 64
+BLOCK: Final = 64
+"""Rows that are computed at a time: how a matrix product is summed depends on its shape; a row must not on others."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +106,7 @@ class RecurrentPolicy:
         """Drum speed commands (N,) rad/s; the first call since the last reset begins the memory."""
         if self._lookout is None:
             self._lookout = Lookout(len(observation), self.card.made_for)
-            self._memory = [None] * -(-len(observation) // _BLOCK)
+            self._memory = [None] * -(-len(observation) // BLOCK)
             outlook = self._lookout.start(observation, self._lifts)
         else:
             outlook = self._lookout.advance(observation)
@@ -120,10 +121,9 @@ class RecurrentPolicy:
             self._lookout.retune(rope_length, growth, wet)
 
     def _share(self, lookout: Lookout, outlook: Outlook) -> FloatArray:
-        # In blocks of one size: how a matrix product is summed depends on its shape, and a row must not on the others.
         rows = len(outlook.series)
         series, figures, *load = (
-            _padded(each)
+            padded(each)
             for each in (
                 outlook.series,
                 lookout.figures,
@@ -138,8 +138,8 @@ class RecurrentPolicy:
         )
         shares = []
         with torch.no_grad():
-            for number, first in enumerate(range(0, rows, _BLOCK)):
-                block = slice(first, first + _BLOCK)
+            for number, first in enumerate(range(0, rows, BLOCK)):
+                block = slice(first, first + BLOCK)
                 context, self._memory[number] = self.network.remember(
                     series[block, None], figures[block], self._memory[number]
                 )
@@ -148,9 +148,9 @@ class RecurrentPolicy:
         return np.asarray(torch.cat(shares)[:rows].double().numpy())
 
 
-def _padded(values: npt.NDArray[np.floating]) -> torch.Tensor:
+def padded(values: npt.NDArray[np.floating]) -> torch.Tensor:
     """Rows (N, …) as a tensor of whole blocks; what is added repeats the first row."""
-    more = -len(values) % _BLOCK
+    more = -len(values) % BLOCK
     return torch.from_numpy(np.concatenate([values, np.repeat(values[:1], more, axis=0)]).astype(np.float32))
 
 

@@ -25,7 +25,7 @@ from train.benchmark import leaderboard, page
 from train.benchmark.ceiling import ceiling_of
 from train.benchmark.leaderboard import LeaderboardRow
 from train.benchmark.measures import measures_of
-from train.benchmark.specialists import specialists
+from train.benchmark.specialists import forecasters, specialists
 from train.evaluate.run import require_period, run_on
 from train.evaluate.statistics import compare_families, family
 from train.shared.cli import parse
@@ -61,7 +61,8 @@ class Options(RunOptions, Where):
     """Tasks of the suite, by name."""
     policies: tuple[str, ...] = POLICIES
     """Names, folders of agents or module:function, as in train.evaluate; drum still and ceiling are always there. By
-    default the laws, the agents that were trained on the nominal task, and those that were on the task at hand."""
+    default the laws, the agents that were trained on the nominal task, and those that were on the task at hand, with
+    predictive control on their forecasts."""
     seeds: int | None = None
     """Of agents that differ in their seed alone the first so many; by default all."""
     split: Literal["test", "validation"] = "test"
@@ -85,7 +86,7 @@ class Options(RunOptions, Where):
 
 def chosen_for(task: Task, options: Options) -> list[PolicySpec]:
     """Policies that are scored on a task."""
-    own = specialists(task) if options.policies == POLICIES else []
+    own = [*specialists(task), *forecasters(task)] if options.policies == POLICIES else []
     return first_seeds(choose_all([*options.policies, *own]), options.seeds)
 
 

@@ -1,9 +1,10 @@
-"""The agents that the package brings for a task: each was trained on one."""
+"""The agents that the package brings for a task, each of which was trained on one, and what they foretell."""
 
 from __future__ import annotations
 
 from typing import Literal
 
+from aframe_env.config import TaskConfig
 from aframe_env.suite import Task
 from aframe_env.text import read_json
 from agents import shipped
@@ -20,3 +21,11 @@ def specialists(task: Task, observation: Literal["state", "sensors"] | None = No
             if card.get("task") == task.id and observation in (None, card["observation"]):
                 found.append(name)
     return found
+
+
+def forecasters(task: Task) -> list[str]:
+    """Predictive control on the forecasts of these agents, where they act on sensors and no radar foretells further."""
+    sensors = TaskConfig(**task.arguments).sensors
+    foretold = sensors is not None and sensors.preview is not None
+    names = [name for name in specialists(task, "sensors") if name in shipped.RECURRENT]
+    return [] if foretold else [f"{name}:forecasts" for name in names]
