@@ -6,23 +6,15 @@ A new kind of policy joins by one entry in ``REGISTRY``, one that lives in a fol
 from __future__ import annotations
 
 import hashlib
-import importlib
-import inspect
-import sys
-import traceback
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, Literal, Protocol
-
-import numpy as np
-import numpy.typing as npt
+from typing import Final, Literal, Protocol
 
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario, Sensors
-from aframe_env.validation import InvalidValue, require_numbers
+from aframe_env.validation import InvalidValue
 from agents import shipped
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.feedback import Feedback
@@ -37,11 +29,12 @@ from agents.drives.optimisation import OptimisedDrive, Optimiser
 from agents.drives.policy import DrivePolicy
 from agents.drives.realtime_map import RealTimeMapPolicy
 from agents.drives.tuned import TUNED, Tuned, optimised, optimised_as_played
+from agents.imported import FunctionPolicy, Imported
 from agents.learned import agent as learned
 from agents.learned import recurrent
 from agents.learned.features import FeatureConfig
 from agents.learned.foretelling import ForetellingControl
-from agents.policy import DrumStill, FloatArray, Knowledge, Policy
+from agents.policy import DrumStill, Knowledge, Policy
 
 
 class Spread(Protocol):
@@ -329,104 +322,16 @@ def _from_folder(folder: Path) -> PolicySpec:
     raise InvalidValue(f"policy = {str(folder)!r}: no agent in this folder: it has none of {', '.join(FOLDERS)}")
 
 
-@dataclass
-class FunctionPolicy:
-    """Somebody's function of the observations (N, K), and perhaps of the time, as a policy that is checked."""
-
-    name: str
-    function: Callable[..., Any]
-    knows: Knowledge
-    takes_time: bool
-    begin: Callable[[Sequence[Scenario], float], Any] | None = None
-    """What is to be called before N episodes."""
-    rows: int = 0
-
-    def reset(self, scenarios: Sequence[Scenario], control_period: float) -> None:
-        """Begin N episodes."""
-        self.rows = len(scenarios)
-        if self.begin is not None:
-            with _somebodys(self.name):
-                self.begin(scenarios, control_period)
-
-    def act(self, observation: npt.NDArray[np.float32], time: float) -> FloatArray:
-        """Drum speed commands of the function, checked: (N,) rad/s."""
-        with _somebodys(self.name):
-            said = self.function(observation, time) if self.takes_time else self.function(observation)
-        speeds = require_numbers(f"drum speeds of {self.name}", said, f"({self.rows},) rad/s")
-        if speeds.shape == (self.rows, 1):
-            speeds = speeds[:, 0]
-        if speeds.shape != (self.rows,):
-            raise InvalidValue(f"{self.name} gave shape {speeds.shape}: must be ({self.rows},), one speed an episode")
-        if not np.isfinite(speeds).all():
-            raise InvalidValue(f"{self.name} gave a drum speed that is not finite at t = {time:g} s: must be rad/s")
-        return speeds
-
-
 def _from_module(text: str, module: str, attribute: str) -> PolicySpec:
-    """Import a policy from ``module:attribute``, the current folder included in the search.
+    """A policy that is imported, or made by what is imported, as ``agents.imported.Imported`` says."""
+    imported = Imported.of(text, module, attribute)
+    found = imported.made
+    if found is None:
 
-    The attribute is a policy, a class or function that makes one when called without arguments, or a function of
-    observations (N, K), and time if it takes two arguments, that gives drum speeds (N,) rad/s.
-    """
-    here = str(Path.cwd())
-    sys.path.insert(0, here)
-    try:
-        with _somebodys(f"policy = {text!r}: cannot be imported"):
-            imported = importlib.import_module(module)
-            found = getattr(imported, attribute)
-    finally:
-        sys.path.remove(here)
-    source = getattr(imported, "__file__", None)  # a built-in module has none
-    digest = _digest(Path(source)) if source else ""
-    if isinstance(found, type) or not _is_policy(found):
-        if not callable(found):
-            raise InvalidValue(f"policy = {text!r}: is a {type(found).__name__}, must be a policy or callable")
-        needed = _required_arguments(found)
-        if needed > 2:
-            raise InvalidValue(f"policy = {text!r}: takes {needed} arguments, must take (observation) or (…, time)")
-        if needed > 0 and not isinstance(found, type):
-            return PolicySpec(
-                text, lambda context: FunctionPolicy(text, found, _seen(context), takes_time=needed == 2), digest=digest
-            )
-        with _somebodys(f"policy = {text!r}: cannot be made"):
-            found = found()
-        if not _is_policy(found):
-            raise InvalidValue(
-                f"policy = {text!r}: made a {type(found).__name__}, must be a policy with name, knows, reset and act"
-            )
+        def build(context: BuildContext) -> Policy:
+            knows = Knowledge.STATE if context.config.sensors is None else Knowledge.SENSORS
+            return FunctionPolicy(text, imported.function, knows, takes_time=imported.takes_time)
+
+        return PolicySpec(text, build, digest=imported.digest)
     policy = FunctionPolicy(found.name, found.act, found.knows, takes_time=True, begin=found.reset)
-    return replace(as_spec(found), build=lambda context: policy, digest=digest)
-
-
-@contextmanager
-def _somebodys(what: str) -> Iterator[None]:
-    """Say in one sentence what somebody's own code raised, and where."""
-    try:
-        yield
-    except (Exception, SystemExit) as error:
-        frames = traceback.extract_tb(error.__traceback__)
-        ours = (__file__, importlib.__file__, "<frozen importlib._bootstrap>", "<frozen importlib._bootstrap_external>")
-        theirs = [frame for frame in frames if frame.filename not in ours]
-        where = f" ({theirs[-1].filename}, line {theirs[-1].lineno})" if theirs else ""
-        raise InvalidValue(f"{what}: {type(error).__name__}: {error}{where}") from error
-
-
-def _seen(context: BuildContext) -> Knowledge:
-    return Knowledge.STATE if context.config.sensors is None else Knowledge.SENSORS
-
-
-def _is_policy(thing: Any) -> bool:
-    return (
-        isinstance(getattr(thing, "name", None), str)
-        and isinstance(getattr(thing, "knows", None), Knowledge)
-        and all(callable(getattr(thing, name, None)) for name in ("reset", "act"))
-    )
-
-
-def _required_arguments(function: Callable[..., Any]) -> int:
-    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    try:
-        parameters = inspect.signature(function).parameters.values()
-    except (TypeError, ValueError):
-        return 1
-    return sum(p.kind in kinds and p.default is inspect.Parameter.empty for p in parameters)
+    return replace(as_spec(found), build=lambda context: policy, digest=imported.digest)

@@ -9,9 +9,9 @@ import tyro
 from torch import nn
 
 from agents import FeatureConfig, FeaturePolicy, load
+from agents.imported import FunctionPolicy
 from agents.learned.feature_sets import features_for
 from agents.policy import DrumStill, Knowledge
-from agents.registry import FunctionPolicy
 from agents.rollout import held_out_scenarios, run
 
 BATCH = 1024

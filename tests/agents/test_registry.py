@@ -12,11 +12,12 @@ from aframe_env.config import TaskConfig
 from agents import load
 from agents.control.expected_waves import ExpectedWaves
 from agents.control.predictive import PredictiveControl
+from agents.imported import FunctionPolicy
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, card_text, digest, serialise
 from agents.learned.features import STATE_FEATURES
 from agents.learned.network import Actor
 from agents.policy import Knowledge
-from agents.registry import REGISTRY, BuildContext, FunctionPolicy, choose, choose_all, slug
+from agents.registry import REGISTRY, BuildContext, choose, choose_all, slug
 from agents.rollout import held_out_scenarios, run
 
 MAP = str(Path(__file__).parents[2] / "results" / "drive-map")
