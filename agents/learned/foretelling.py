@@ -21,7 +21,8 @@ from aframe_env.validation import InvalidValue
 from agents.control.lift import Lift
 from agents.control.predictive import Planner, PlanningConfig
 from agents.control.regulator import Observation
-from agents.learned.recurrent import BLOCK, RecurrentCard, padded
+from agents.learned.recurrent import RecurrentCard
+from agents.learned.recurrent_features import BLOCK, padded
 from agents.learned.recurrent_inputs import FORECASTS, RATES_AHEAD, Lookout, LookoutConfig, Outlook
 from agents.learned.recurrent_network import RecurrentNetwork
 from agents.policy import FloatArray, Knowledge

@@ -22,15 +22,14 @@ from aframe_env.validation import InvalidValue
 from agents import cards
 from agents.control.expected_waves import ExpectedWaves
 from agents.learned.agent import digest, one_line_lists
-from agents.learned.recurrent_inputs import Lookout, LookoutConfig, Outlook
-from agents.learned.recurrent_network import Load, RecurrentNetwork
+from agents.learned.recurrent_features import RecurrentFeatures, in_blocks
+from agents.learned.recurrent_inputs import LookoutConfig
+from agents.learned.recurrent_network import RecurrentNetwork
 from agents.policy import FloatArray, Knowledge
 
 FORMAT: Final = 1
 WEIGHTS: Final = "recurrent.safetensors"
 CARD: Final = "recurrent.json"
-BLOCK: Final = 64
-"""Rows that are computed at a time: how a matrix product is summed depends on its shape; a row must not on others."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +59,10 @@ class RecurrentCard:
     """Whether it reckons how much later than told readings and winch are."""
     chains: bool = False
     """Whether it reckons with the rope's mass and the water's drag."""
+    started_from: str = ""
+    """The agent that it began as, by its algorithm and the sha256 of its weights; empty for none."""
+    timesteps: int = 0
+    """Control steps that it has learned from since then, by trial in the environment."""
     format: int = FORMAT
 
     @property
@@ -87,8 +90,7 @@ class RecurrentPolicy:
     name: str = field(init=False)
     knows: Knowledge = field(init=False)
     _lifts: Sequence[Scenario] = field(init=False, repr=False, default=())
-    _lookout: Lookout | None = field(init=False, repr=False, default=None)
-    _memory: list[torch.Tensor | None] = field(init=False, repr=False, default_factory=list)
+    _features: RecurrentFeatures | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         sensed = self.card.sensors is not None
@@ -100,58 +102,29 @@ class RecurrentPolicy:
         trained = self.card.control_period
         if abs(control_period - trained) > 1e-9:
             raise InvalidValue(f"control_period = {control_period} s: the agent was trained for {trained} s")
-        self._lifts, self._lookout = scenarios, None
+        self._lifts, self._features = scenarios, None
 
     def act(self, observation: npt.NDArray[np.float32], time: float) -> FloatArray:
         """Drum speed commands (N,) rad/s; the first call since the last reset begins the memory."""
-        if self._lookout is None:
-            self._lookout = Lookout(len(observation), self.card.made_for)
-            self._memory = [None] * -(-len(observation) // BLOCK)
-            outlook = self._lookout.start(observation, self._lifts)
+        if self._features is None:
+            self._features = RecurrentFeatures(len(observation), self.card.made_for, self.network)
+            inputs = self._features.start(observation, self._lifts)
         else:
-            outlook = self._lookout.advance(observation)
-        share = self._share(self._lookout, outlook)
+            inputs = self._features.advance(observation)
+        share = self._share(inputs)
         if not np.isfinite(share).all():
             raise InvalidValue(f"{self.name} gave an output that is not finite: must be in [-1, 1]")
-        return self._lookout.command(share)
+        return self._features.command(share)
 
     def retune(self, rope_length: FloatArray, growth: FloatArray, wet: FloatArray) -> None:
         """Go on with other ropes and loads, as by ``HoistBatch.retune``."""
-        if self._lookout is not None:
-            self._lookout.retune(rope_length, growth, wet)
+        if self._features is not None:
+            self._features.retune(rope_length, growth, wet)
 
-    def _share(self, lookout: Lookout, outlook: Outlook) -> FloatArray:
-        rows = len(outlook.series)
-        series, figures, *load = (
-            padded(each)
-            for each in (
-                outlook.series,
-                lookout.figures,
-                outlook.z,
-                outlook.rise,
-                outlook.speed,
-                lookout.gains,
-                lookout.most_change,
-                lookout.most_speed,
-                lookout.lag,
-            )
-        )
-        shares = []
+    def _share(self, inputs: npt.NDArray[np.float32]) -> FloatArray:
         with torch.no_grad():
-            for number, first in enumerate(range(0, rows, BLOCK)):
-                block = slice(first, first + BLOCK)
-                context, self._memory[number] = self.network.remember(
-                    series[block, None], figures[block], self._memory[number]
-                )
-                seen = Load(*(each[block] for each in load))
-                shares.append(self.network.share(self.network.prepare(context[:, 0]), seen))
-        return np.asarray(torch.cat(shares)[:rows].double().numpy())
-
-
-def padded(values: npt.NDArray[np.floating]) -> torch.Tensor:
-    """Rows (N, …) as a tensor of whole blocks; what is added repeats the first row."""
-    more = -len(values) % BLOCK
-    return torch.from_numpy(np.concatenate([values, np.repeat(values[:1], more, axis=0)]).astype(np.float32))
+            shares = [self.network.act(block) for block in in_blocks(inputs)]
+        return np.asarray(torch.cat(shares)[: len(inputs)].double().numpy())
 
 
 def serialise(network: RecurrentNetwork) -> bytes:

@@ -21,7 +21,7 @@ from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE, quantities
 from aframe_env.validation import InvalidValue
 from agents.control.expected_waves import ExpectedWaves
-from agents.control.filters import FloatArray
+from agents.control.filters import ALL, FloatArray, Rows
 from agents.control.lateness import require_readings
 from agents.control.lift import Lift
 from agents.control.observer import KalmanObserver, observer_for
@@ -174,34 +174,33 @@ class Lookout:
         """(N,) greatest change of it in a control step, m/s."""
         return self._period * self._hoists.winch.radius * self._hoists.winch.max_acceleration
 
-    def start(self, observation: Observation, lifts: Sequence[Lift]) -> Outlook:
-        """Begin with first observations (N, K)."""
-        hoists = self._hoists
-        o = hoists.start(lifts, observation)
-        self._observer.start(o)
-        self._tune(o)
-        return self._look(observation, o, np.zeros(len(observation)))
+    def start(self, observation: Observation, lifts: Sequence[Lift], rows: Rows = ALL) -> Outlook:
+        """Begin with first observations (n, K) in these ``rows``, whose past is forgotten; what is seen of them."""
+        o = self._hoists.start(lifts, observation, rows)
+        self._observer.start(o, rows)
+        self._tune(o, rows)
+        return self._look(observation, o, np.zeros(len(observation)), rows)
 
     def retune(self, rope_length: FloatArray, growth: FloatArray, wet: FloatArray) -> None:
         """Go on with other ropes and loads, as by ``HoistBatch.retune``."""
         self._observer.retune(self._hoists.retune(rope_length, growth, wet))
-        self._tune({"rope_length": rope_length, "pulley_heave": np.zeros(len(rope_length))})
+        self._tune({"rope_length": rope_length, "pulley_heave": np.zeros(len(rope_length))}, ALL)
 
-    def _tune(self, o: Columns) -> None:
+    def _tune(self, o: Columns, rows: Rows) -> None:
         hoists = self._hoists
-        self.gains = hoists.model(DAMPING_RATIO).gains(hoists.efforts(EFFORT))
-        speed, acceleration, lag = winch_features(hoists.winch)
-        _, *lift = lift_features(o["pulley_heave"], hoists.mass, o["rope_length"], hoists.frequency)
+        self.gains[rows] = hoists.model(DAMPING_RATIO, rows).gains(hoists.efforts(EFFORT, rows))
+        speed, acceleration, lag = (each[rows] for each in winch_features(hoists.winch))
+        _, *lift = lift_features(o["pulley_heave"], hoists.mass[rows], o["rope_length"], hoists.frequency[rows])
         # Of order one, and about zero, for the winches of the tasks.
         figures = (4.0 * (speed - 1.0), 2.0 * (acceleration - 1.5), lag, *lift)
-        self.figures = np.stack(figures, axis=1).astype(np.float32)
+        self.figures[rows] = np.stack(figures, axis=1)
 
     def advance(self, observation: Observation) -> Outlook:
         """Take the observations (N, K), one control step later."""
         o = self._hoists.columns(observation)
         foretold = self._observer.waves.rate(np.array([self._period]))[0]
         self._observer.advance(self.turned, o)
-        return self._look(observation, o, o["pulley_velocity_z"] - foretold)
+        return self._look(observation, o, o["pulley_velocity_z"] - foretold, ALL)
 
     def command(self, share: FloatArray) -> FloatArray:
         """Drum speed commands (N,) rad/s: change the speed by this share (N,) of what the winch can in a step.
@@ -218,30 +217,30 @@ class Lookout:
         self.turned = self._hoists.winch.turn(command)
         return command
 
-    def _look(self, observation: Observation, o: Columns, surprise: FloatArray) -> Outlook:
+    def _look(self, observation: Observation, o: Columns, surprise: FloatArray, rows: Rows) -> Outlook:
         waves, winch, lateness = self._observer.waves, self._hoists.winch, self._observer.lateness
         rates_at, rises_at, ends_at = self._rates_at, self._rises_at, self._step_ends_at
         if lateness is not None:
             rates_at, rises_at, ends_at = (each[:, None] + lateness.seconds for each in (rates_at, rises_at, ends_at))
         path = waves.path(rises_at)
-        foretold = np.zeros((0, len(surprise)))
+        foretold = np.zeros((0, len(self.turned)))
         if self._previewed is not None:
-            self._previewed.take(observation)
+            self._previewed.take(observation, rows)
             foretold = self._previewed.rises_at_leads(waves)
         series = (
-            *waves.rate(rates_at),
-            *(path[1:] - path[0]),
+            *waves.rate(rates_at)[:, rows],
+            *(path[1:] - path[0])[:, rows],
             *(scale * o[name] for name, scale in self._scales.items()),
-            *(() if lateness is None else (_LATENESS_SCALE * lateness.seconds,)),
-            *self._of_unit(),
-            *(_PREVIEW_SCALE * foretold),
+            *(() if lateness is None else (_LATENESS_SCALE * lateness.seconds[rows],)),
+            *(each[rows] for each in self._of_unit()),
+            *(_PREVIEW_SCALE * foretold[:, rows]),
             _SURPRISE_SCALE * surprise,
         )
-        z = self._observer.state()
+        z = self._observer.state()[rows]
         rise = self._observer.rises(1)[0] / self._period
         if (winch.lag > 0.0).any():
             rise = np.where(winch.lag > 0.0, waves.rate(ends_at)[0], rise)
-        return Outlook(np.stack(series, axis=1).astype(np.float32), z, rise, winch.radius * winch.speed)
+        return Outlook(np.stack(series, axis=1).astype(np.float32), z, rise[rows], (winch.radius * winch.speed)[rows])
 
     def _of_unit(self) -> tuple[FloatArray, ...]:
         """What is seen of a motion reference unit: whether it is heard, and what the depth says against it."""

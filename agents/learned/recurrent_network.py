@@ -10,6 +10,8 @@ from torch import nn
 from agents.learned.recurrent_inputs import FIGURES, FORECASTS
 
 LOAD_FEATURES = 10
+LOAD_NUMBERS = 13
+"""Numbers in a ``Load`` of one lift."""
 
 
 class OneSided(torch.autograd.Function):
@@ -57,6 +59,36 @@ class Load(NamedTuple):
     lag: torch.Tensor
     """Of the winch, in control steps."""
 
+    @classmethod
+    def of(cls, numbers: torch.Tensor) -> Load:
+        """From numbers (B, ``LOAD_NUMBERS``) one beside the other, in this order."""
+        z, (rise, speed), gains = numbers[:, :4], numbers[:, 4:6].unbind(1), numbers[:, 6:10]
+        return cls(z, rise, speed, gains, *numbers[:, 10:].unbind(1))
+
+    def regulating(self) -> torch.Tensor:
+        """Speed (B,) of the rope's end that the regulator asks for, m/s up."""
+        return self.z[..., 3] - (self.gains * self.z).sum(-1)
+
+    def features(self, p: torch.Tensor) -> torch.Tensor:
+        """What a network is shown of it, (B, ``LOAD_FEATURES``), of order one; ``p`` as from ``regulating``."""
+        z, change = self.z, self.most_change
+        following, regulated = (self.rise - self.speed) / change, (self.rise - p - self.speed) / change
+        return torch.stack(
+            [
+                4.0 * torch.tanh(0.5 * z[..., 0]),
+                2.0 * torch.tanh(10.0 * z[..., 0]),
+                3.0 * z[..., 1],
+                10.0 * (z[..., 2] - z[..., 0]),
+                2.0 * z[..., 3],
+                self.speed,
+                self.speed / self.most_speed,
+                following.clamp(-4.0, 4.0),
+                regulated.clamp(-4.0, 4.0),
+                3.0 * p.clamp(-1.0, 1.0),
+            ],
+            dim=-1,
+        )
+
 
 class RecurrentNetwork(nn.Module):
     """A GRU on the series of an ``Outlook``, and a perceptron on what it remembers and on the load.
@@ -93,6 +125,11 @@ class RecurrentNetwork(nn.Module):
         forecast = series[..., :FORECASTS] + self.forecast(seen)
         return torch.cat([seen, forecast, told], dim=-1), last
 
+    @property
+    def context_size(self) -> int:
+        """Numbers of a context."""
+        return self.of_context.in_features
+
     def forecasts(self, context: torch.Tensor) -> torch.Tensor:
         """Corrected forecasts (…, FORECASTS) in contexts (…, C): heave rates, then rises."""
         return context[..., self.memory_size : self.memory_size + FORECASTS]
@@ -102,27 +139,15 @@ class RecurrentNetwork(nn.Module):
         prepared: torch.Tensor = self.of_context(context)
         return prepared
 
+    def act(self, seen: torch.Tensor) -> torch.Tensor:
+        """The same as ``share``, from contexts and the numbers of loads one beside the other, (B, C + 13)."""
+        context, load = seen[:, : self.context_size], Load.of(seen[:, self.context_size :])
+        return self.share(self.prepare(context), load)
+
     def share(self, prepared: torch.Tensor, load: Load) -> torch.Tensor:
         """Change of the rope's speed (B,) over the coming step, as a share of what the winch can; not clipped yet."""
-        z, change = load.z, load.most_change
-        p = z[..., 3] - (load.gains * z).sum(-1)
-        following, regulated = (load.rise - load.speed) / change, (load.rise - p - load.speed) / change
-        of_load = torch.stack(
-            [
-                4.0 * torch.tanh(0.5 * z[..., 0]),
-                2.0 * torch.tanh(10.0 * z[..., 0]),
-                3.0 * z[..., 1],
-                10.0 * (z[..., 2] - z[..., 0]),
-                2.0 * z[..., 3],
-                load.speed,
-                load.speed / load.most_speed,
-                following.clamp(-4.0, 4.0),
-                regulated.clamp(-4.0, 4.0),
-                3.0 * p.clamp(-1.0, 1.0),
-            ],
-            dim=-1,
-        )
-        hidden = nn.functional.silu(prepared + self.of_load(of_load))
+        change, p = load.most_change, load.regulating()
+        hidden = nn.functional.silu(prepared + self.of_load(load.features(p)))
         weight, correction, push = self.last(nn.functional.silu(self.second(hidden))).unbind(-1)
         goal = load.rise - torch.sigmoid(weight + 1.0) * p.clamp(-0.5, 0.5) - 0.5 * correction
         wanted = (goal - load.speed) / change

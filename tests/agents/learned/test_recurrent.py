@@ -15,6 +15,7 @@ from agents.control.expected_waves import ExpectedWaves
 from agents.control.winch import WinchModel
 from agents.learned.agent import digest
 from agents.learned.recurrent import CARD, WEIGHTS, RecurrentCard, RecurrentPolicy, card_text, load, serialise
+from agents.learned.recurrent_features import RecurrentFeatures
 from agents.learned.recurrent_inputs import FORECASTS, RATES_AHEAD, RISES_AHEAD, Lookout, LookoutConfig
 from agents.learned.recurrent_network import change_for, change_in_lag, clip_one_sided
 from agents.policy import Knowledge
@@ -85,6 +86,31 @@ def test_a_row_does_not_depend_on_the_others(observation):
     for row in (0, 37, 66):
         alone = play(policy, scenarios[row : row + 1], first=row)
         assert np.array_equal(alone.drum_speed[0], many.drum_speed[row])
+
+
+@pytest.mark.parametrize("observation", ["state", "sensors"])
+def test_inputs_of_rows_that_start_anew_are_those_of_a_fresh_start(observation):
+    policy, _ = agent(observation)
+    scenarios = held_out_scenarios(SEAS, 5)
+    simulation = Simulation(5, TaskConfig(scenario=SEAS, observation=observation))
+    simulation.reset_rows(np.arange(5), [(scenario, 7) for scenario in scenarios])
+    many = RecurrentFeatures(5, policy.card.made_for, policy.network)
+    inputs = many.start(simulation.observe(), scenarios)
+    for _ in range(12):
+        simulation.advance(many.command(np.full(5, 0.2)))
+        inputs = many.advance(simulation.observe())
+    rows, fresh = np.array([1, 4]), RecurrentFeatures(2, policy.card.made_for, policy.network)
+    simulation.reset_rows(rows, [(scenarios[0], 8), (scenarios[2], 9)])
+    seen, lifts = simulation.observe()[rows], [scenarios[0], scenarios[2]]
+    inputs[rows] = many.start(seen, lifts, rows)
+    other = fresh.start(seen, lifts)
+    for _ in range(12):
+        assert np.array_equal(inputs[rows], other)
+        output = 3.0 * inputs[:, 0].astype(float)
+        command = many.command(output)
+        assert np.array_equal(command[rows], fresh.command(output[rows]))
+        simulation.advance(command)
+        inputs, other = many.advance(simulation.observe()), fresh.advance(simulation.observe()[rows])
 
 
 def test_a_new_episode_begins_with_a_fresh_memory():
@@ -271,7 +297,7 @@ def test_other_ropes_retune_it():
     seen[:, 11:] = 5e5, 5e4, 500.0  # tension, mass, length
     lookout, longer = Lookout(2, LookoutConfig(waves=WAVES)), Lookout(2, LookoutConfig(waves=WAVES))
     lookout.start(seen, scenarios)
-    before = lookout.gains
+    before = lookout.gains.copy()
     lookout.retune(np.full(2, 800.0), np.zeros(2), np.ones(2))
     seen[:, 13] = 800.0
     longer.start(seen, scenarios)
