@@ -25,6 +25,7 @@ from agents.control.regulator import Observation
 from agents.learned.feature_sets import features_for
 from agents.learned.features import STATE_FEATURES, Action, FeatureConfig, require_action
 from agents.learned.following import FollowingFeatures
+from agents.learned.recurrent_features import RecurrentFeatures
 
 Float32Array = npt.NDArray[np.float32]
 
@@ -93,10 +94,21 @@ def shaped(xp: Any, mean_square: Any, scale: float, knee: float) -> Any:
 class LearnerFeatures:
     """Features of N rows as a learner observes them: the agent's, then those that are for critics alone."""
 
-    def __init__(self, rows: int, config: FeatureConfig, *, privileged: bool, follow: bool = False) -> None:
-        """``privileged``: as in ``InterfaceConfig``; ``follow``: targets and frames that move."""
+    def __init__(
+        self,
+        rows: int,
+        config: FeatureConfig,
+        *,
+        privileged: bool,
+        follow: bool = False,
+        agents: RecurrentFeatures | None = None,
+    ) -> None:
+        """``privileged``: as in ``InterfaceConfig``; ``follow``: targets and frames that move.
+
+        ``agents``: the agent's features, in the place of the config's.
+        """
         make = FollowingFeatures if follow else features_for
-        self._features = make(rows, config)
+        self._features = agents or make(rows, config)
         self._privileged = (
             make(rows, replace(config, sensors=None, action="residual", winch=False, adapts=False))
             if privileged and config.sensors

@@ -11,19 +11,18 @@ from __future__ import annotations
 import sys
 import time
 from dataclasses import replace
-from pathlib import Path
 from typing import Final
 
 from rich.console import Console
 
 from aframe_env.validation import InvalidValue
-from agents.learned.recurrent import CARD, WEIGHTS, RecurrentPolicy, card_text
+from agents.learned.recurrent import CARD, WEIGHTS, card_text
 from train.apg.data import require_known
 from train.apg.options import ApgOptions
 from train.apg.stages import Training, to_policy
 from train.shared.cli import parse, read_options
 from train.shared.console import PlainConsole
-from train.shared.run_folder import CONFIG, open_run, user_errors, write_atomically, write_json, write_text
+from train.shared.run_folder import CONFIG, open_run, user_errors, write_agent, write_json
 
 COMMAND: Final = "train.apg"
 METRICS: Final = "metrics.json"
@@ -60,17 +59,11 @@ def train_one(options: ApgOptions, console: Console) -> None:
     begin = time.perf_counter()
     best = training.run()
     policy, weights = to_policy(best.network, options)
-    save(folder, policy, weights)
+    write_agent(folder / WEIGHTS, weights, folder / CARD, card_text(policy.card))
     seconds = round(time.perf_counter() - begin, 1)
     write_json(folder / METRICS, {"seconds": seconds, "looks": best.looks})
     training.remove()
     console.print(f"agent: {folder / WEIGHTS} after {seconds:.0f} s")
-
-
-def save(folder: Path, policy: RecurrentPolicy, weights: bytes) -> None:
-    """Write the agent: weights first, the card that vouches for them last."""
-    write_atomically(folder / WEIGHTS, lambda path: path.write_bytes(weights))
-    write_text(folder / CARD, card_text(policy.card))
 
 
 def _options() -> ApgOptions:

@@ -56,7 +56,8 @@ class ApgOptions(RunOptions):
     imitation_rate: float = 1.5e-3
     """Learning rate of each round at the start."""
     updates: int = 260
-    """Steps along the gradient of the score through the twin, each on ``batch`` whole episodes."""
+    """Steps along the gradient of the score through the twin, each on ``batch`` whole episodes; 0 for what imitation
+    has taught alone."""
     batch: int = 128
     """Episodes."""
     rate: float = 1e-3

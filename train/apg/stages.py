@@ -48,7 +48,7 @@ def to_policy(network: RecurrentNetwork, options: ApgOptions) -> tuple[Recurrent
     """A network as a policy, and the bytes of its weights."""
     weights, config = serialise(network), LookoutConfig.of(options.config)
     card = RecurrentCard(
-        algorithm="recurrent APG",
+        algorithm=_algorithm(options),
         observation=options.observation,
         sensors=config.sensors,
         waves=config.waves,
@@ -63,6 +63,13 @@ def to_policy(network: RecurrentNetwork, options: ApgOptions) -> tuple[Recurrent
         chains=config.chains,
     )
     return RecurrentPolicy(network, card), weights
+
+
+def _algorithm(options: ApgOptions) -> str:
+    """Name of what all stages make; a network that was taught nothing is nearly a regulator."""
+    if options.updates:
+        return "recurrent APG"
+    return "recurrent imitation" if options.rounds else "recurrent regulator"
 
 
 class Training:

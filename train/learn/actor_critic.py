@@ -20,7 +20,7 @@ from torch import nn
 from agents.learned.network import Actor, perceptron
 
 
-def _aligned(x: torch.Tensor) -> torch.Tensor:
+def aligned(x: torch.Tensor) -> torch.Tensor:
     """A copy that begins where PyTorch's own tensors do, at a multiple of 64 bytes.
 
     The last bits of a product with two or three rows depend on that, and NumPy's arrays lie where they happen to: a
@@ -39,7 +39,7 @@ class ActorLatent(nn.Module):
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """Return the latent (N, hidden + inputs)."""
-        x = _aligned(x[:, : self.inputs])
+        x = aligned(x[:, : self.inputs])
         return torch.cat([self.perceptron(x), x], dim=-1)
 
 
@@ -52,7 +52,7 @@ class CriticLatent(nn.Module):
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """Return the latent (N, hidden + 2 inputs)."""
-        x = _aligned(x)
+        x = aligned(x)
         return torch.cat([self.perceptron(x), x, torch.clamp(x * x, max=10.0)], dim=-1)
 
 
@@ -73,7 +73,7 @@ class ActionCriticLatent(nn.Module):
         return torch.cat([self.states(x), torch.clamp(x[:, :-1] * x[:, -1:], -10.0, 10.0)], dim=-1)
 
 
-def _constant(inputs: int, value: float) -> nn.Linear:
+def constant(inputs: int, value: float) -> nn.Linear:
     """A linear layer that begins with the same output whatever its inputs."""
     layer = nn.Linear(inputs, 1)
     nn.init.zeros_(layer.weight)
@@ -143,7 +143,7 @@ class TwoPathPolicy(ActorCriticPolicy):
             part.requires_grad_(not frozen)
         self.log_std.requires_grad_(not frozen)
 
-    def to_actor(self) -> Actor:
+    def to_actor(self) -> nn.Module:
         """Return the mean action as a plain network of its own."""
         latent = self.mlp_extractor.actor
         assert isinstance(latent, ActorLatent)
@@ -174,8 +174,8 @@ class TwoPathSACPolicy(SACPolicy):
         actor = super().make_actor(features_extractor)
         latent = self._actor_inputs + self._hidden
         actor.latent_pi = ActorLatent(self._actor_inputs, self._hidden)  # type: ignore[assignment]
-        actor.mu = _constant(latent, 0.0)
-        actor.log_std = _constant(latent, -1.5)  # type: ignore[assignment]
+        actor.mu = constant(latent, 0.0)
+        actor.log_std = constant(latent, -1.5)  # type: ignore[assignment]
         return actor
 
     def make_critic(self, features_extractor: BaseFeaturesExtractor | None = None) -> ContinuousCritic:
@@ -183,13 +183,17 @@ class TwoPathSACPolicy(SACPolicy):
         critic = super().make_critic(features_extractor)
         inputs = critic.features_extractor.features_dim + 1
         for i in range(critic.n_critics):
-            latent = ActionCriticLatent(inputs, self._critic_hidden)
-            network = nn.Sequential(latent, nn.Linear(latent.outputs, 1))
+            network = self._make_value(inputs)
             critic.q_networks[i] = network
             setattr(critic, f"qf{i}", network)
         return critic
 
-    def to_actor(self) -> Actor:
+    def _make_value(self, inputs: int) -> nn.Module:
+        """A critic's network of so many inputs, the action the last."""
+        latent = ActionCriticLatent(inputs, self._critic_hidden)
+        return nn.Sequential(latent, nn.Linear(latent.outputs, 1))
+
+    def to_actor(self) -> nn.Module:
         """Return the mean action as a plain network of its own."""
         latent = self.actor.latent_pi
         assert isinstance(latent, ActorLatent)

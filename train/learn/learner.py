@@ -9,9 +9,9 @@ from typing import Any, Protocol, runtime_checkable
 
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
+from torch import nn
 
 from aframe_env import task
-from agents.learned.network import Actor
 from train.learn.memory import Memory, of_tensors, to_tensors
 from train.learn.options import LearningOptions
 
@@ -75,7 +75,7 @@ class Best:
     """Mean share of the heave that it leaves in the scenarios that it is looked at on."""
     timesteps: int = 0
     """Control steps that it has learned from."""
-    actor: Actor | None = None
+    actor: nn.Module | None = None
 
     def memory(self) -> Memory:
         """What is kept of it."""
@@ -83,7 +83,7 @@ class Best:
             return Memory(values={"left": None, "timesteps": 0})
         return Memory(of_tensors(self.actor.state_dict()).arrays, {"left": self.left, "timesteps": self.timesteps})
 
-    def recall(self, memory: Memory, to_actor: Callable[[], Actor]) -> None:
+    def recall(self, memory: Memory, to_actor: Callable[[], nn.Module]) -> None:
         """Put back what ``memory`` told; ``to_actor`` makes an agent of its kind."""
         if memory.values["left"] is not None:
             self.left, self.timesteps, self.actor = memory.values["left"], memory.values["timesteps"], to_actor()
@@ -97,7 +97,8 @@ class Learner:
     algorithm: str
     model: Model
     rows: Rows
-    to_actor: Callable[[], Actor]
+    to_actor: Callable[[], nn.Module]
+    """The agent's network as it is, a copy."""
     best: Best = field(default_factory=Best)
 
 

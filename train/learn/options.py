@@ -12,6 +12,8 @@ from aframe_env.suite import find_task
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
 from agents.learned.features import Action, FeatureConfig
 from agents.learned.interface import InterfaceConfig, LearnerFeatures
+from agents.learned.recurrent import RecurrentPolicy, load
+from agents.learned.recurrent_features import RecurrentFeatures
 from train.evaluate.run import HeldOut
 from train.shared.jobs import Where
 from train.shared.run_folder import RunOptions
@@ -36,6 +38,9 @@ class LearningOptions(RunOptions, Where):
     action: Action = "residual"
     """What the network's output is: "residual" moves the rope's end, above a hand-written feed-forward that follows the
     pulley; "speed" is the drum's speed, with nothing below it; "predictive" corrects what predictive control plans."""
+    start_from: Path | None = None
+    """Folder of a recurrent agent to learn on from, as train.apg --updates 0 gives: its memory stays as it is, and its
+    perceptron is the actor, whose output is the share of the winch's acceleration that the drum speeds up with."""
     winch: bool = False
     """Tell the agent limits and lag of the winch, for scenarios in which they differ."""
     practice: int = 0
@@ -99,6 +104,8 @@ class LearningOptions(RunOptions, Where):
         if self.task is not None:
             self._require_task()
         self.config  # noqa: B018 - raises here, before anything is written
+        if self.start_from is not None:
+            self._require_start()
         require_integer("batch_size", self.batch_size, low=2, high=10**9)
         require_number("learning_rate", self.learning_rate, "", low=0.0, high=1.0, low_open=True)
         require_number("gamma", self.gamma, "", low=0.0, high=1.0)
@@ -109,6 +116,26 @@ class LearningOptions(RunOptions, Where):
         require_integer("eval_privileged", self.eval_privileged, low=0, high=10**6)
         require_integer("threads", self.threads, low=1, high=256)
         require_number("checkpoint_every", self.checkpoint_every, "s", low=0.0, high=1e9)
+
+    def _require_start(self) -> None:
+        """Raise where the agent to learn on from does not go with the rest."""
+        start = self.start
+        assert start is not None
+        if self.action != "residual" or self.winch:
+            raise InvalidValue(
+                f"action = {self.action!r}, winch = {self.winch}: must be left out beside --start-from, whose "
+                "agent has an action and inputs of its own"
+            )
+        if start.card.sensors != self.config.sensors:
+            raise InvalidValue(
+                f"start_from = {str(self.start_from)!r}: its agent observes {start.card.observation!r}: must be with "
+                f"the very sensors of the training, whose observation = {self.observation!r}"
+            )
+        if abs(start.card.control_period - self.control_period) > 1e-9:
+            raise InvalidValue(
+                f"control_period = {self.control_period:g} s: must be {start.card.control_period:g} s, that of the "
+                "agent to start from"
+            )
 
     def _require_task(self) -> None:
         """Raise where what is asked for does not go with the task of the suite."""
@@ -141,10 +168,23 @@ class LearningOptions(RunOptions, Where):
         """What the agent's features are made for."""
         return FeatureConfig.of(self.config, self.action, winch=self.winch, adapts=self.adapts)
 
+    @cached_property
+    def start(self) -> RecurrentPolicy | None:
+        """The recurrent agent to learn on from."""
+        return None if self.start_from is None else load(self.start_from)
+
+    def learner_features(self, rows: int) -> LearnerFeatures:
+        """What so many rows observe."""
+        start = self.start
+        if start is None:
+            return LearnerFeatures.of(self.config, rows, self.interface)
+        agents = RecurrentFeatures(rows, start.card.made_for, start.network)
+        return LearnerFeatures(rows, self.features, privileged=self.interface.privileged, agents=agents)
+
     @property
     def width(self) -> int:
         """Fewest numbers of a row's observation; scenarios of ``practice`` tell the critic more."""
-        return len(LearnerFeatures(1, self.features, privileged=self.interface.privileged).names)
+        return len(self.learner_features(1).names)
 
     @cached_property
     def interface(self) -> InterfaceConfig:

@@ -14,6 +14,7 @@ from train.learn.actor_critic import TwoPathPolicy
 from train.learn.learner import Learner, LearnerSpec, Range, Search
 from train.learn.options import LearningOptions
 from train.learn.sb3_env import make_rows
+from train.learn.share import SharePolicy
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,9 +80,10 @@ def check(options: Options) -> None:
 def build(options: Options) -> Learner:
     """The learner and its rows."""
     rows = make_rows(options)
+    start = options.start
     model = CriticFirstPPO(
         options.critic_first,
-        TwoPathPolicy,
+        TwoPathPolicy if start is None else SharePolicy,
         rows,
         n_steps=options.n_steps,
         batch_size=options.batch_size,
@@ -94,6 +96,7 @@ def build(options: Options) -> Learner:
             "actor_inputs": rows.actor_inputs,
             "hidden": options.hidden,
             "log_std_init": options.log_std_init,
+            **({} if start is None else {"network": start.network}),
         },
         seed=options.seed,
         device="cpu",
@@ -109,6 +112,8 @@ def build(options: Options) -> Learner:
 def _successor(options: Options) -> str | None:
     if options.device == "cuda":
         return "ppo-rsl"
+    if options.start_from is not None:
+        return "ppo-recurrent"
     return "ppo-predictive" if options.action == "predictive" else None
 
 

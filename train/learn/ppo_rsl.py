@@ -65,6 +65,8 @@ class Options(ppo.Options):
             raise InvalidValue(f"observation = {self.observation!r}: must be 'state' with rows on a GPU")
         if self.action == "predictive" or self.practice:
             raise InvalidValue(f"action = {self.action!r}, practice = {self.practice}: not with rows on a GPU")
+        if self.start_from is not None:
+            raise InvalidValue(f"start_from = {str(self.start_from)!r}: not with rows on a GPU")
         require_integer("batch_size", self.batch_size, low=2, high=self.n_steps * self.n_envs)
 
 

@@ -18,8 +18,7 @@ import numpy.typing as npt
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario
 from agents.control.optimum import required_speeds, saturating
-from agents.learned.agent import output_zero
-from agents.learned.features import FeatureConfig
+from agents.policy import Policy
 from agents.registry import DRUM_STILL, BuildContext, as_spec
 from agents.rollout import drawn_scenarios, run
 
@@ -32,11 +31,11 @@ SERIES: Final = 500_000_003
 DRAWN: Final = 5
 """As many times the scenarios that are wanted are drawn, to find enough in which the winch saturates."""
 MEAN_REWARD: Final = 0.05
-"""Mean loss in a control step with an output of zero."""
+"""Mean loss in a control step with the base."""
 FARTHEST: Final = 2.0
 """Root mean square of the depth error in a control step beyond which it costs no more, m."""
 RESOLUTION: Final = 0.01
-"""Share of a still drum's heave that is added to what is left with an output of zero, where rewards are weighed."""
+"""Share of a still drum's heave that is added to what the base leaves, where rewards are weighed."""
 AHEAD: Final = (0, 2, 4, 6, 9, 12, 16, 20, 25, 30, 36, 42, 50)
 """Control steps to come whose waves the critic is told."""
 
@@ -51,16 +50,14 @@ class Practice:
     waves: Float32Array
     """(N, n + 1, W) what the critic is told at each control step: the rope's speed that would hold the load still and
     its changes over a step, ``AHEAD``, as shares of the winch's greatest; how much the sea moves the load, and what
-    share is left with an output of zero."""
+    share the base leaves."""
 
     @classmethod
-    def of(cls, config: TaskConfig, features: FeatureConfig, count: int, seed: int) -> Practice:
-        """Draw ``count`` scenarios of the task, and find what an agent of output zero leaves in them."""
+    def of(cls, config: TaskConfig, base: Policy, count: int, seed: int) -> Practice:
+        """Draw ``count`` scenarios of the task, and find what the ``base`` leaves in them, which is to be bettered."""
         scenarios = half_saturating(config, SERIES + seed, count)
         context = BuildContext(scenarios=scenarios, config=config)
-        still, left = (
-            run(spec.policy(context), scenarios, config).rms for spec in (DRUM_STILL, as_spec(output_zero(features)))
-        )
+        still, left = (run(spec.policy(context), scenarios, config).rms for spec in (DRUM_STILL, as_spec(base)))
         still = np.maximum(still, 1e-6)
         # The slope of the mean share that is left, √(mean square) / still, over a scenario's mean square.
         slope = 1.0 / ((left + RESOLUTION * still) * still)

@@ -16,8 +16,10 @@ from train.learn.options import LearningOptions
 LEARNERS: Final = {
     "ppo": "train.learn.ppo",
     "ppo-predictive": "train.learn.ppo_predictive",
+    "ppo-recurrent": "train.learn.ppo_recurrent",
     "ppo-rsl": "train.learn.ppo_rsl",
     "sac": "train.learn.sac",
+    "sac-recurrent": "train.learn.sac_recurrent",
 }
 """Module of each learner. One is imported when it is asked for, since some need an extra."""
 

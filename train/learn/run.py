@@ -17,7 +17,6 @@ from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 
 from aframe_env.text import read_json
 from aframe_env.validation import InvalidValue
-from agents.learned.agent import WEIGHTS, load
 from train.evaluate.run import evaluate
 from train.learn.checkpoint import FOLDER, Checkpoints, KeepCheckpoints, Stopped, stop_by_signal
 from train.learn.learner import LearnerSpec, Rows
@@ -25,7 +24,7 @@ from train.learn.logs import open_logger, require_logs
 from train.learn.options import LearningOptions
 from train.learn.registry import find_learner, learner_of
 from train.learn.selection import KeepBest
-from train.learn.trained import best_policy, save
+from train.learn.trained import best_policy, load_trained, save
 from train.shared.cli import parse, read_options, to_mapping
 from train.shared.console import PlainConsole
 from train.shared.jobs import Where, run_jobs
@@ -211,7 +210,7 @@ def _train_one(spec: LearnerSpec, options: LearningOptions, console: Console, *,
         if status:
             return status
     if options.eval_scenarios and compared:
-        evaluate(load(folder), folder, options.held_out, console)
+        evaluate(load_trained(folder), folder, options.held_out, console)
     return 0
 
 
@@ -253,7 +252,7 @@ def _learn(spec: LearnerSpec, options: LearningOptions, opened: Run, console: Co
             stopped = signalled
     seconds = time.perf_counter() - begin
     policy, weights = best_policy(learner, options)
-    save(folder, policy, weights)
+    place = save(folder, policy, weights)
     write_json(
         folder / METRICS,
         {
@@ -264,7 +263,7 @@ def _learn(spec: LearnerSpec, options: LearningOptions, opened: Run, console: Co
             **({"best_after": learner.best.timesteps, "heave_left": learner.best.left} if options.selected_by else {}),
         },
     )
-    console.print(f"agent: {folder / WEIGHTS} after {model.num_timesteps:,} steps in {seconds:.0f} s")
+    console.print(f"agent: {place} after {model.num_timesteps:,} steps in {seconds:.0f} s")
     if stopped is not None:
         console.print(f"stopped by {stopped}: --resume {folder} goes on")
         return stopped.status

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from stable_baselines3 import SAC
 
@@ -13,6 +13,7 @@ from train.learn.actor_critic import TwoPathSACPolicy
 from train.learn.learner import Learner, LearnerSpec, Range, Search
 from train.learn.options import LearningOptions
 from train.learn.sb3_env import make_rows
+from train.learn.share import ShareSACPolicy
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +46,10 @@ class Options(LearningOptions):
     """Steps of the return before the critic's estimate."""
     learning_starts: int = 6400
     """Control steps of random actions before the first update."""
+    critic_first: int = 0
+    """Control steps at the start that the critics learn from alone."""
+    log_std_init: float = -2.3
+    """Logarithm of the first standard deviation of an action, with ``start_from``."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -56,6 +61,27 @@ class Options(LearningOptions):
         require_number("ent_coef", self.ent_coef, "", low=0.0, high=1e3, low_open=True)
         require_integer("n_steps", self.n_steps, low=1, high=1000)
         require_integer("learning_starts", self.learning_starts, low=0, high=10**9)
+        require_integer("critic_first", self.critic_first, low=0, high=10**9)
+        require_number("log_std_init", self.log_std_init, "", low=-20.0, high=2.0)
+
+
+class CriticFirstSAC(SAC):
+    """SAC whose critics learn alone at first: untrained, they would lead an actor astray that has learned already."""
+
+    def __init__(self, critic_first: int, *args: Any, **kwargs: Any) -> None:
+        self._critic_first = critic_first
+        super().__init__(*args, **kwargs)
+
+    def train(self, gradient_steps: int, batch_size: int = 64) -> None:
+        """Update the networks from the replay; at first neither the actor nor the entropy's weight."""
+        alone, tuned = self.num_timesteps <= self._critic_first, self.ent_coef_optimizer
+        self.actor.requires_grad_(not alone)
+        if alone and self.log_ent_coef is not None:
+            self.ent_coef_optimizer, self.ent_coef_tensor = None, self.log_ent_coef.detach().exp()
+        try:
+            super().train(gradient_steps, batch_size)
+        finally:
+            self.ent_coef_optimizer = tuned
 
 
 def check(options: Options) -> None:
@@ -67,8 +93,10 @@ def check(options: Options) -> None:
 def build(options: Options) -> Learner:
     """The learner and its rows."""
     rows = make_rows(options)
-    model = SAC(
-        TwoPathSACPolicy,
+    start = options.start
+    model = CriticFirstSAC(
+        options.critic_first,
+        TwoPathSACPolicy if start is None else ShareSACPolicy,
         rows,
         learning_rate=options.rate,
         buffer_size=options.replay,
@@ -85,6 +113,7 @@ def build(options: Options) -> Learner:
             "actor_inputs": rows.actor_inputs,
             "hidden": options.hidden,
             "critic_hidden": options.critic_hidden,
+            **({} if start is None else {"network": start.network, "log_std_init": options.log_std_init}),
         },
         seed=options.seed,
         device="cpu",
@@ -92,6 +121,10 @@ def build(options: Options) -> Learner:
     policy = model.policy
     assert isinstance(policy, TwoPathSACPolicy)
     return Learner("SAC", model, rows, policy.to_actor)
+
+
+def _successor(options: Options) -> str | None:
+    return None if options.start_from is None else "sac-recurrent"
 
 
 SPEC: Final = LearnerSpec(
@@ -110,4 +143,5 @@ SPEC: Final = LearnerSpec(
         },
         {"gradient_steps": (2, 4, 8), "batch_size": (256, 512, 1024)},
     ),
+    successor=_successor,
 )

@@ -19,11 +19,13 @@ from aframe_env import task
 from aframe_env.config import TaskConfig
 from aframe_env.scenario import Scenario
 from aframe_env.simulation import RowState, Simulation
+from agents.learned.agent import output_zero
 from agents.learned.features import LIMIT
 from agents.learned.interface import Cuts, InterfaceConfig, LearnerFeatures
 from train.learn.memory import Memory, into_object, of_object
 from train.learn.options import LearningOptions
 from train.learn.practice import Practice
+from train.learn.share import REACH
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
@@ -57,12 +59,15 @@ class TrainingVecEnv(VecEnv):
         interface: InterfaceConfig | None = None,
         *,
         practice: Practice | None = None,
+        features: LearnerFeatures | None = None,
+        reach: float = 1.0,
         seed: int = 0,
     ) -> None:
         """Make so many rows of the task; ``seed`` for the draws of scenarios.
 
         ``practice``: scenarios to draw from in the place of the task's, with their own reward and what they tell the
-        critic, at the end of an observation.
+        critic, at the end of an observation. ``features``: what the rows observe, in the place of the interface's;
+        ``reach``: how far actions go.
         """
         interface = interface or InterfaceConfig()
         self._interface = interface
@@ -75,13 +80,13 @@ class TrainingVecEnv(VecEnv):
         """State of the generator before each row's scenario was drawn."""
         self._commands = np.zeros(rows)
         self._no_infos: list[dict[str, Any]] = [{} for _ in range(rows)]
-        self._features = LearnerFeatures.of(simulation.config, rows, interface)
+        self._features = features or LearnerFeatures.of(simulation.config, rows, interface)
         self._cuts = Cuts(rows, simulation.control_period, simulation.episode_duration, interface)
         told = practice.waves.shape[2] if practice else 0
         super().__init__(
             rows,
             spaces.Box(-LIMIT, LIMIT, (len(self._features.names) + told,), np.float32),
-            spaces.Box(-1.0, 1.0, (1,), np.float32),
+            spaces.Box(-reach, reach, (1,), np.float32),
         )
         self._return = np.zeros(rows)
         self._length = np.zeros(rows, dtype=np.int64)
@@ -252,5 +257,14 @@ def make_rows(options: LearningOptions) -> TrainingVecEnv:
     torch.set_num_threads(options.threads)
     practice = None
     if options.practice:
-        practice = Practice.of(options.config, options.features, options.practice, options.seed)
-    return TrainingVecEnv(options.n_envs, options.config, options.interface, practice=practice, seed=options.seed)
+        base = options.start or output_zero(options.features)
+        practice = Practice.of(options.config, base, options.practice, options.seed)
+    return TrainingVecEnv(
+        options.n_envs,
+        options.config,
+        options.interface,
+        practice=practice,
+        features=options.learner_features(options.n_envs),
+        reach=1.0 if options.start is None else REACH,
+        seed=options.seed,
+    )

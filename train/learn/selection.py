@@ -11,7 +11,6 @@ from typing import Final
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
-from agents.learned.agent import LearnedPolicy
 from agents.policy import FloatArray
 from agents.registry import DRUM_STILL, BuildContext, PolicySpec, as_spec
 from agents.rollout import run
@@ -55,12 +54,12 @@ class KeepBest(BaseCallback):
         self._look()
 
     def _look(self) -> None:
-        policy: LearnedPolicy = to_policy(self._learner, self._options)[0]
+        policy = to_policy(self._learner, self._options)[0]
         left = float(np.mean(self._rms(as_spec(policy)) / self._still))
         self.logger.record("selection/heave_left", left)
         best = self._learner.best
         if left < best.left:
-            best.left, best.timesteps, best.actor = left, self.num_timesteps, policy.actor
+            best.left, best.timesteps, best.actor = left, self.num_timesteps, self._learner.to_actor()
 
     def _rms(self, spec: PolicySpec) -> FloatArray:
         """What a policy leaves (N,) m, as it is compared: made to follow a target that moves."""

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from torch import nn
+
 from aframe_env.suite import find_task
-from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, serialise
+from agents.learned import recurrent
+from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, load, serialise
 from agents.learned.feature_sets import feature_names
 from agents.learned.features import Action
 from agents.learned.network import Actor
+from agents.learned.recurrent import RecurrentPolicy
+from agents.learned.recurrent_network import RecurrentNetwork
 from train.learn.learner import Learner
 from train.learn.options import LearningOptions
-from train.shared.run_folder import versions, write_atomically, write_text
+from train.shared.run_folder import versions, write_agent
+
+Trained = LearnedPolicy | RecurrentPolicy
 
 AGENT_NAMES: Final[dict[Action, str]] = {
     "speed": "{}",
@@ -22,18 +30,21 @@ AGENT_NAMES: Final[dict[Action, str]] = {
 """Names of agents by their action, to be filled in with the learner's."""
 
 
-def to_policy(learner: Learner, options: LearningOptions) -> tuple[LearnedPolicy, bytes]:
+def to_policy(learner: Learner, options: LearningOptions) -> tuple[Trained, bytes]:
     """The agent as it is, as a policy, and the bytes of its weights."""
     return _policy(learner.to_actor(), learner, options, learner.model.num_timesteps)
 
 
-def best_policy(learner: Learner, options: LearningOptions) -> tuple[LearnedPolicy, bytes]:
+def best_policy(learner: Learner, options: LearningOptions) -> tuple[Trained, bytes]:
     """The best agent that was looked at, or the one that is there if none was."""
     best = learner.best
     return to_policy(learner, options) if best.actor is None else _policy(best.actor, learner, options, best.timesteps)
 
 
-def _policy(actor: Actor, learner: Learner, options: LearningOptions, timesteps: int) -> tuple[LearnedPolicy, bytes]:
+def _policy(actor: nn.Module, learner: Learner, options: LearningOptions, timesteps: int) -> tuple[Trained, bytes]:
+    if isinstance(actor, RecurrentNetwork):
+        return _recurrent(actor, learner, options, timesteps)
+    assert isinstance(actor, Actor)
     weights = serialise(actor)
     card = AgentCard(
         algorithm=AGENT_NAMES[options.action].format(learner.algorithm),
@@ -56,7 +67,34 @@ def _policy(actor: Actor, learner: Learner, options: LearningOptions, timesteps:
     return LearnedPolicy(actor, card), weights
 
 
-def save(folder: Path, policy: LearnedPolicy, weights: bytes) -> None:
-    """Write the agent: weights first, the card that vouches for them last."""
-    write_atomically(folder / WEIGHTS, lambda path: path.write_bytes(weights))
-    write_text(folder / CARD, card_text(policy.card))
+def _recurrent(
+    network: RecurrentNetwork, learner: Learner, options: LearningOptions, timesteps: int
+) -> tuple[RecurrentPolicy, bytes]:
+    assert options.start is not None
+    weights, begun = recurrent.serialise(network), options.start.card
+    card = replace(
+        begun,
+        algorithm=f"recurrent {learner.algorithm} from {begun.algorithm.removeprefix('recurrent ')}",
+        task="" if options.task is None else find_task(options.task).id,
+        seed=options.seed,
+        versions=versions(),
+        sha256=digest(weights),
+        started_from=f"{begun.algorithm}, {begun.sha256}",
+        timesteps=timesteps,
+    )
+    return RecurrentPolicy(network, card), weights
+
+
+def save(folder: Path, policy: Trained, weights: bytes) -> Path:
+    """Write the agent; return the place of the weights."""
+    if isinstance(policy, RecurrentPolicy):
+        place, card, text = folder / recurrent.WEIGHTS, recurrent.CARD, recurrent.card_text(policy.card)
+    else:
+        place, card, text = folder / WEIGHTS, CARD, card_text(policy.card)
+    write_agent(place, weights, folder / card, text)
+    return place
+
+
+def load_trained(folder: Path) -> Trained:
+    """Load what ``save`` wrote."""
+    return recurrent.load(folder) if (folder / recurrent.CARD).is_file() else load(folder)

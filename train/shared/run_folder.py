@@ -88,6 +88,12 @@ def write_text(path: Path, text: str) -> None:
     write_atomically(path, lambda temporary: temporary.write_text(text, encoding="utf-8"))
 
 
+def write_agent(place: Path, weights: bytes, card: Path, text: str) -> None:
+    """Write an agent: weights first, the card that vouches for them last."""
+    write_atomically(place, lambda path: path.write_bytes(weights))
+    write_text(card, text)
+
+
 def write_json(path: Path, data: Any) -> None:
     """Write a JSON file, all or nothing; NaN is refused."""
     write_text(path, json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n")

@@ -19,6 +19,7 @@ import pytest
 from rich.console import Console
 
 from aframe_env.validation import InvalidValue
+from agents import shipped
 from agents.learned.agent import load
 from train.learn import checkpoint
 from train.learn.checkpoint import ARRAYS, CARD, FOLDER, SEGMENTS, Checkpoints
@@ -29,6 +30,7 @@ from train.learn.run import main, train
 Start = Callable[..., subprocess.Popen[str]]
 PPO = {"n_envs": 3, "n_steps": 8, "batch_size": 12, "n_epochs": 2, "horizon": 2.0}
 SAC = {"n_envs": 3, "learning_starts": 12, "replay": 30, "batch_size": 8, "horizon": 2.0}
+START = min(shipped.RECURRENT["apg-storm"].glob("seed-*"))
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "ppo": ("ppo", {**PPO, "selected_by": 2}),
     "ppo on sensors": ("ppo", {**PPO, "observation": "sensors"}),
@@ -42,7 +44,15 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
         {**PPO, "observation": "sensors", "task": "Landing", "practice": 2, "selected_by": 2, "horizon": 4.0},
     ),
     "ppo of rsl_rl": ("ppo-rsl", {**PPO, "device": "cpu", "drift_limit": 0.5, "selected_by": 2}),
+    "ppo from a recurrent agent": (
+        "ppo-recurrent",
+        {**PPO, "start_from": START, "practice": 4, "selected_by": 2, "critic_first": 2, "horizon": 4.0},
+    ),
     "sac": ("sac", SAC),
+    "sac from a recurrent agent": (
+        "sac-recurrent",
+        {**SAC, "start_from": START, "learning_starts": 0, "practice": 0, "selected_by": 2, "critic_first": 60},
+    ),
     "sac on sensors, speed": ("sac", {**SAC, "observation": "sensors", "action": "speed", "n_steps": 2}),
 }
 STEPS = 120
@@ -58,7 +68,7 @@ def options_of(case: str, out: Path, **more: Any) -> tuple[LearnerSpec, Any]:
 
 
 def agent(folder: Path) -> bytes:
-    return (folder / "agent.safetensors").read_bytes()
+    return min(folder.glob("*.safetensors")).read_bytes()
 
 
 @pytest.mark.parametrize("case", CASES)
