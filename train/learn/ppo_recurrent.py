@@ -17,6 +17,8 @@ class Options(ppo_predictive.Options):
     """Left out: the agent to start from has one of its own."""
     observation: Literal["state", "sensors"] = "sensors"
     """Observation of the agent, as that of the one to start from."""
+    timesteps: int = 3_000_000
+    """Control steps to learn from, over all rows."""
     hidden: int = 128
     """Units of each hidden layer of the critic."""
 

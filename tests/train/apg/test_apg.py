@@ -61,12 +61,13 @@ def test_a_tiny_training_improves_on_its_start(trained, tmp_path):
     best = min(looks(trained), key=lambda look: look["shortfall"])
     assert best["shortfall"] < start["shortfall"] - 0.05
     assert best["worst"] > start["worst"]
+    assert load(tmp_path / "start").card.algorithm == "recurrent regulator"
 
 
 def test_what_is_written_is_an_agent_and_no_stage_is_left(trained):
     policy = load(trained)
     assert policy.knows is Knowledge.SENSORS
-    assert policy.card.task == "AFrameHeave-Storm-v0"
+    assert (policy.card.algorithm, policy.card.task) == ("recurrent APG", "AFrameHeave-Storm-v0")
     assert (policy.card.memory, policy.card.hidden, policy.card.seed) == (16, 32, 0)
     assert not (trained / FOLDER).exists()
     with pytest.raises(InvalidValue, match="this training is finished"):
