@@ -41,6 +41,8 @@ class LearningOptions(RunOptions, Where):
     start_from: Path | None = None
     """Folder of a recurrent agent to learn on from, as train.apg --updates 0 gives: its memory stays as it is, and its
     perceptron is the actor, whose output is the share of the winch's acceleration that the drum speeds up with."""
+    actor_rate: float = 1.0
+    """With ``start_from``: learning rate of the actor, as a share of the critic's. What it knows is soon lost."""
     winch: bool = False
     """Tell the agent limits and lag of the winch, for scenarios in which they differ."""
     practice: int = 0
@@ -104,10 +106,9 @@ class LearningOptions(RunOptions, Where):
         if self.task is not None:
             self._require_task()
         self.config  # noqa: B018 - raises here, before anything is written
-        if self.start_from is not None:
-            self._require_start()
         require_integer("batch_size", self.batch_size, low=2, high=10**9)
         require_number("learning_rate", self.learning_rate, "", low=0.0, high=1.0, low_open=True)
+        require_number("actor_rate", self.actor_rate, "of the critic's", low=0.0, high=1.0, low_open=True)
         require_number("gamma", self.gamma, "", low=0.0, high=1.0)
         require_integer("hidden", self.hidden, low=1, high=4096)
         require_number("horizon", self.horizon, "s", low=self.control_period, high=self.episode_duration)
@@ -117,10 +118,11 @@ class LearningOptions(RunOptions, Where):
         require_integer("threads", self.threads, low=1, high=256)
         require_number("checkpoint_every", self.checkpoint_every, "s", low=0.0, high=1e9)
 
-    def _require_start(self) -> None:
-        """Raise where the agent to learn on from does not go with the rest."""
+    def require_start(self) -> None:
+        """Raise where there is no agent to learn on from, or it does not go with the rest."""
         start = self.start
-        assert start is not None
+        if start is None:
+            raise InvalidValue("start_from = None: must be the folder of a recurrent agent")
         if self.action != "residual" or self.winch:
             raise InvalidValue(
                 f"action = {self.action!r}, winch = {self.winch}: must be left out beside --start-from, whose "

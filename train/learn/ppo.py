@@ -7,6 +7,7 @@ from typing import Any, Final, Literal
 
 from stable_baselines3 import PPO
 from torch import nn
+from torch.optim import Optimizer
 
 from aframe_env.memory import require_memory
 from aframe_env.validation import require_choice, require_integer, require_number
@@ -14,7 +15,7 @@ from train.learn.actor_critic import TwoPathPolicy
 from train.learn.learner import Learner, LearnerSpec, Range, Search
 from train.learn.options import LearningOptions
 from train.learn.sb3_env import make_rows
-from train.learn.share import SharePolicy
+from train.learn.share import SharePolicy, slow_down
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +71,10 @@ class CriticFirstPPO(PPO):
         policy.freeze_actor(update <= self._critic_first)
         super().train()
 
+    def _update_learning_rate(self, optimizers: list[Optimizer] | Optimizer) -> None:
+        super()._update_learning_rate(optimizers)
+        slow_down(optimizers)
+
 
 def check(options: Options) -> None:
     """Raise where a rollout does not fit into memory."""
@@ -96,7 +101,7 @@ def build(options: Options) -> Learner:
             "actor_inputs": rows.actor_inputs,
             "hidden": options.hidden,
             "log_std_init": options.log_std_init,
-            **({} if start is None else {"network": start.network}),
+            **({} if start is None else {"network": start.network, "actor_rate": options.actor_rate}),
         },
         seed=options.seed,
         device="cpu",

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from stable_baselines3 import SAC
+from torch.optim import Optimizer
 
 from aframe_env.memory import require_memory
 from aframe_env.validation import require_integer, require_number
@@ -13,7 +14,7 @@ from train.learn.actor_critic import TwoPathSACPolicy
 from train.learn.learner import Learner, LearnerSpec, Range, Search
 from train.learn.options import LearningOptions
 from train.learn.sb3_env import make_rows
-from train.learn.share import ShareSACPolicy
+from train.learn.share import ShareSACPolicy, slow_down
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,6 +84,10 @@ class CriticFirstSAC(SAC):
         finally:
             self.ent_coef_optimizer = tuned
 
+    def _update_learning_rate(self, optimizers: list[Optimizer] | Optimizer) -> None:
+        super()._update_learning_rate(optimizers)
+        slow_down(optimizers)
+
 
 def check(options: Options) -> None:
     """Raise where the replay does not fit into memory."""
@@ -113,7 +118,11 @@ def build(options: Options) -> Learner:
             "actor_inputs": rows.actor_inputs,
             "hidden": options.hidden,
             "critic_hidden": options.critic_hidden,
-            **({} if start is None else {"network": start.network, "log_std_init": options.log_std_init}),
+            **(
+                {}
+                if start is None
+                else {"network": start.network, "actor_rate": options.actor_rate, "log_std_init": options.log_std_init}
+            ),
         },
         seed=options.seed,
         device="cpu",

@@ -25,8 +25,14 @@ class Options(sac.Options):
     """Rows start a new scenario after this time, s."""
     learning_rate: float = 3e-4
     """At the start; it falls linearly to a thirtieth."""
-    gamma: float = 0.97
-    """Discount for a control step: a horizon of three seconds."""
+    actor_rate: float = 0.03
+    """Learning rate of the actor, as a share of the critics'."""
+    batch_size: int = 1024
+    """Minibatch."""
+    gradient_steps: int = 2
+    """Updates for each step of all rows."""
+    gamma: float = 0.99
+    """Discount for a control step: a horizon of ten seconds, as far as the teacher of imitation looks ahead."""
     tau: float = 0.005
     """Share by which the target critics follow at each update."""
     target_entropy: float = -2.0
@@ -37,6 +43,10 @@ class Options(sac.Options):
     """Control steps of random actions before the first update: none, for the agent knows what to do."""
     critic_first: int = 100_000
     """Control steps at the start that the critics learn from alone."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.require_start()
 
 
 SPEC: Final = LearnerSpec(

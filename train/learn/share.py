@@ -1,8 +1,8 @@
 """Recurrent agents as actors of Stable-Baselines3: what is learned is the perceptron, what the memory does stays.
 
 A row's observation is what the perceptron sees, ``RecurrentFeatures``, and then what is for critics alone. The mean
-action is the agent's output, cut to the ±1 that count; actions may go a little further, so that the cut ones are not at
-the end of SAC's tanh.
+action is the agent's output. It counts up to ±1; actions go a little further, so that these are not at the ends of
+SAC's tanh.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ import torch
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.sac.policies import Actor as SACActor
 from torch import nn
+from torch.optim import Optimizer
 
-from agents.learned.recurrent_network import LOAD_FEATURES, LOAD_NUMBERS, Load, RecurrentNetwork, clip_one_sided
+from agents.learned.recurrent_network import LOAD_FEATURES, LOAD_NUMBERS, Load, RecurrentNetwork
 from train.learn.actor_critic import (
     ActionCriticLatent,
     CriticLatent,
@@ -30,6 +31,8 @@ from train.learn.actor_critic import (
 
 REACH: Final = 1.25
 """How far actions go; what is beyond 1 the winch cannot follow."""
+FARTHEST: Final = 1.2
+"""How far the mean does where it passes through tanh."""
 
 
 class First(nn.Module):
@@ -54,10 +57,13 @@ class Share(nn.Module):
         self._squashed = squashed
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
-        """Return the mean (N, 1); beyond ±1 only gradients that lead back inside come through."""
-        share = self.network.act(x)
-        share = clip_one_sided(share, torch.ones_like(share))[:, None]
-        return torch.atanh(share / REACH) if self._squashed else share
+        """Return the mean (N, 1).
+
+        Gradients that are mostly noise must not come through one-sided, as those of ``train.apg`` do: what leads back
+        inside would always win.
+        """
+        share = self.network.act(x)[:, None]
+        return torch.atanh(share.clamp(-FARTHEST, FARTHEST) / REACH) if self._squashed else share
 
 
 class CriticView(nn.Module):
@@ -100,10 +106,23 @@ class ShareExtractor(nn.Module):
         return latent
 
 
+SLOWER: Final = "slower"
+"""Key of an optimiser's group whose learning rate is a share of that of all."""
+
+
+def slow_down(optimizers: Optimizer | list[Optimizer]) -> None:
+    """Make rates slower, where groups are to be slower, that were set to the same one for all."""
+    for optimizer in optimizers if isinstance(optimizers, list) else [optimizers]:
+        for group in optimizer.param_groups:
+            group["lr"] *= group.get(SLOWER, 1.0)
+
+
 class SharePolicy(TwoPathPolicy):
     """PPO's policy: a recurrent agent's perceptron, and a critic of its own."""
 
-    def __init__(self, *args: Any, network: RecurrentNetwork, **kwargs: Any) -> None:
+    def __init__(self, *args: Any, network: RecurrentNetwork, actor_rate: float, **kwargs: Any) -> None:
+        """``actor_rate``: learning rate of the actor, as a share of the critic's."""
+        self._actor_rate = actor_rate
         self._make_share: Callable[[], Share] = partial(Share, network, squashed=False)
         super().__init__(*args, **kwargs)
 
@@ -115,7 +134,11 @@ class SharePolicy(TwoPathPolicy):
     def _build(self, lr_schedule: Callable[[float], float]) -> None:
         super()._build(lr_schedule)
         self.action_net = self._make_share()
-        self.optimizer = self.optimizer_class(self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs)  # type: ignore[call-arg]
+        actor = [*self.action_net.parameters(), self.log_std]
+        ours = set(map(id, actor))
+        critic = [parameter for parameter in self.parameters() if id(parameter) not in ours]
+        groups: list[dict[str, Any]] = [{"params": actor, SLOWER: self._actor_rate}, {"params": critic}]
+        self.optimizer = self.optimizer_class(groups, lr=lr_schedule(1), **self.optimizer_kwargs)  # type: ignore[call-arg]
 
     def to_actor(self) -> nn.Module:
         """Return the agent's network, a copy."""
@@ -126,11 +149,19 @@ class SharePolicy(TwoPathPolicy):
 class ShareSACPolicy(TwoPathSACPolicy):
     """SAC's policy: a recurrent agent's perceptron, and critics of its own."""
 
-    def __init__(self, *args: Any, network: RecurrentNetwork, log_std_init: float, **kwargs: Any) -> None:
+    def __init__(
+        self, *args: Any, network: RecurrentNetwork, actor_rate: float, log_std_init: float, **kwargs: Any
+    ) -> None:
         """``log_std_init``: logarithm of the first standard deviation of an action about zero."""
+        self._actor_rate = actor_rate
         self._make_share: Callable[[], Share] = partial(Share, network, squashed=True)
         self._log_std_init = log_std_init
         super().__init__(*args, **kwargs)
+
+    def _build(self, lr_schedule: Callable[[float], float]) -> None:
+        super()._build(lr_schedule)
+        for group in self.actor.optimizer.param_groups:
+            group[SLOWER] = self._actor_rate
 
     def make_actor(self, features_extractor: BaseFeaturesExtractor | None = None) -> SACActor:
         """Return an actor that does what the agent does, and something near it."""

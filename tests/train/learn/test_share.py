@@ -75,7 +75,7 @@ def test_before_learning_the_actor_does_what_the_agent_does_that_it_starts_from(
         if finished.any():
             break
     assert step > 2
-    assert largest == pytest.approx(1.0)
+    assert largest > 1.0
     untrained = to_policy(learner, module.Options(**few, observation=observation, start_from=tmp_path))[0]
     scenarios = held_out_scenarios(ScenarioDistribution(), 2)
     plays = [run(each, scenarios, episode_duration=3.0, observation=observation) for each in (untrained, start)]
@@ -123,8 +123,8 @@ def test_the_critics_learn_first(name, tmp_path):
 
 def test_start_from_leads_to_options_of_their_own(tmp_path):
     taught(tmp_path)
-    assert ppo.SPEC.successor(ppo.Options(observation="sensors", start_from=tmp_path)) == "ppo-recurrent"
-    assert sac.SPEC.successor(sac.Options(observation="sensors", start_from=tmp_path)) == "sac-recurrent"
+    assert ppo.SPEC.successor(ppo.Options(start_from=tmp_path)) == "ppo-recurrent"
+    assert sac.SPEC.successor(sac.Options(start_from=tmp_path)) == "sac-recurrent"
     assert ppo.SPEC.successor(ppo.Options()) is sac.SPEC.successor(sac.Options()) is None
 
 
