@@ -10,6 +10,7 @@ from typing import Literal
 from aframe_env.config import TaskConfig
 from aframe_env.suite import find_task
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
+from agents.control.lowering import moves
 from agents.learned.features import Action, FeatureConfig
 from agents.learned.interface import InterfaceConfig, LearnerFeatures
 from agents.learned.recurrent import RecurrentPolicy, load
@@ -132,6 +133,11 @@ class LearningOptions(RunOptions, Where):
             raise InvalidValue(
                 f"start_from = {str(self.start_from)!r}: its agent observes {start.card.observation!r}: must be with "
                 f"the very sensors of the training, whose observation = {self.observation!r}"
+            )
+        if moves(self.config.nominal):
+            raise InvalidValue(
+                f"start_from = {str(self.start_from)!r}: must not be given where target or frame move, for recurrent "
+                "agents do not follow them"
             )
         if abs(start.card.control_period - self.control_period) > 1e-9:
             raise InvalidValue(
