@@ -14,6 +14,7 @@ from agents.registry import BuildContext, choose_all
 from agents.rollout import held_out_scenarios, run
 from train.benchmark import ceiling, leaderboard
 from train.evaluate.run import observation_of
+from train.evaluate.statistics import family
 from train.shared.run_folder import versions
 
 RESULTS = Path(__file__).parents[3] / "results"
@@ -84,7 +85,8 @@ def test_an_agent_of_a_task_meets_its_row_of_the_leaderboard(folder):
     config, scenarios = TaskConfig(**task.arguments), task.scenarios("test", 100)
     digests = tuple(spec.digest for spec in specs)
     rows = leaderboard.read(RESULTS / "tasks" / leaderboard.NAME)
-    (row,) = [row for row in rows if (row.task, row.sha256, row.scenarios) == (task.id, digests, 100)]
+    known = (task.id, family(specs[0].name), digests, 100)
+    (row,) = [row for row in rows if (row.task, row.policy, row.sha256, row.scenarios) == known]
     stored = ceiling.read(RESULTS / "tasks" / task.name.lower() / ceiling.file_name("test"))
     assert row.seeds == len(specs)
     shares = []
