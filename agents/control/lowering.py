@@ -208,13 +208,17 @@ class Ways:
         return o.astype(np.float32)
 
     def retune(self, policy: Retunable) -> None:
-        """Tune the policy to ropes and loads as they are planned now, if one has become another one."""
-        changed = np.maximum(abs(self._now / self._tuned[0] - 1.0), abs(self._wet - self._tuned[1]))
-        if np.any(changed > RETUNE_AT):
+        """Tune the policy to those ropes and loads that have become other ones as they are planned now.
+
+        The others are tuned to what they have been tuned to: no row depends on another.
+        """
+        changed = np.maximum(abs(self._now / self._tuned[0] - 1.0), abs(self._wet - self._tuned[1])) > RETUNE_AT
+        if changed.any():
+            self._tuned[:, changed] = self._now[changed], self._wet[changed]
+            length, wet = self._tuned.copy()
             rope_weight = np.array([scenario.rope_weight for scenario in self._scenarios])
-            lighter = self._buoyancy * (self._wet - self._first_wet)
-            policy.retune(self._now.copy(), rope_weight * (self._now - self._first[0]) - lighter, self._wet.copy())
-            self._tuned = np.array([self._now, self._wet])
+            lighter = self._buoyancy * (wet - self._first_wet)
+            policy.retune(length, rope_weight * (length - self._first[0]) - lighter, wet)
 
     def command(self, command: FloatArray) -> FloatArray:
         """Drum speed commands (N,) rad/s for those of the policy, for what it saw last."""

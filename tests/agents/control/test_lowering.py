@@ -112,6 +112,17 @@ def test_a_policy_is_tuned_to_a_rope_that_grows() -> None:
     assert np.ptp([policy._hoists.frequency[0], fresh._hoists.frequency[0]]) < 0.05  # type: ignore[union-attr]
 
 
+def test_when_a_policy_is_tuned_anew_goes_by_each_lift_alone() -> None:
+    paths = (TargetPath.lowering(-30.0, 1.0, start=5.0), TargetPath.lowering(-30.0, 0.9, start=8.0))
+    both = [in_a_sea(replace(THROUGH, target_path=path)) for path in paths]
+    policy = Following(PredictiveControl(PlanningConfig(chains=True)), Sensors())
+    together = run(policy, both, observation="sensors", episode_duration=45.0).error
+    for place, one in enumerate(both):
+        alone = run(policy, [one], observation="sensors", episode_duration=45.0, first=place).error
+        # But for rounding: how a product of matrices is summed goes by their number.
+        np.testing.assert_allclose(together[place], alone[0], rtol=0.0, atol=1e-6)
+
+
 def test_the_plan_is_the_rope_at_rest() -> None:
     plan = PayOut.weighed(HEAVY, HEAVY.hanging_weight)
     assert plan.weight == pytest.approx(HEAVY.weight, rel=1e-9)
