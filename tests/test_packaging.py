@@ -77,7 +77,7 @@ print(agents.drives.map.load().shape, agents.registry.choose("drive-map:clock").
     for folder in (folder for folder in folders if folder not in recurrent):
         agent = agents.load(folder / "seed-0")
         expected.append(f"{folder.name} {agent.card.sha256} ['{agent.name}']")
-    assert len(expected) == 8
+    assert len(expected) == 12
     names = {"apg-state-storm": "recurrent APG"}
     expected += [f"{folder.name} ['{names.get(folder.name, 'recurrent APG on sensors')}']" for folder in recurrent]
     assert [folder.name for folder in recurrent] == [

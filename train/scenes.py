@@ -23,6 +23,7 @@ from aframe_env.scenario import Scenario
 from aframe_env.scenario.sea import SeaMotion
 from aframe_env.suite import TASKS, Task, find_task
 from aframe_env.validation import InvalidValue, require_integer
+from agents import shipped
 from agents.registry import DRUM_STILL, OPTIMUM, choose_all
 from agents.rollout import Episodes
 from train.benchmark.specialists import specialists
@@ -33,7 +34,7 @@ from train.shared.console import PlainConsole
 from train.shared.run_folder import user_errors, write_atomically
 
 PICTURE: Final = "scene.png"
-LAWS: Final[Mapping[str, str]] = {"Splash": "feed-forward + feedback"}
+LAWS: Final[Mapping[str, str]] = {"Splash": "predictive control"}
 LAW: Final = "adaptive predictive control"
 """Best hand-written law on sensors of these tasks, and of all others."""
 
@@ -74,9 +75,14 @@ class Scene:
 
 
 def find_scene(task: Task, count: int, console: Console | None = None) -> Scene:
-    """Run everybody in so many validation scenarios of a task, and choose its scene among them."""
+    """Run best law, agent and optimum in so many validation scenarios of a task, and choose its scene among them.
+
+    The agent is the recurrent one that was trained on the task, or another where there is none.
+    """
     scenarios = task.scenarios("validation", count)
-    specs = [*choose_all([LAWS.get(task.name, LAW), *specialists(task, "sensors")]), OPTIMUM]
+    trained = specialists(task, "sensors")
+    agents = [name for name in trained if name in shipped.RECURRENT] or trained
+    specs = [*choose_all([LAWS.get(task.name, LAW), *agents]), OPTIMUM]
     seed = task.seed("validation")
     ran = run_on(specs, TaskConfig(**task.arguments), scenarios, console or PlainConsole(), seed=seed)
     still, law, *_, best = (entry.episodes.rms for entry in ran.entries)

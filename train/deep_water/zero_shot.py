@@ -28,7 +28,14 @@ POLICIES: Final = (
     "feed-forward + feedback",
     shipped.DRIVE_MAP,
     "output zero on sensors",
-    *shipped.AGENTS,
+    "ppo",
+    "ppo-sensors",
+    "ppo-speed",
+    "predictive-ppo",
+    "predictive-ppo-sensors",
+    "sac",
+    "sac-sensors",
+    "sac-speed",
 )
 """By their names on the command line; of each agent one seed."""
 ON_SENSORS: Final = (
