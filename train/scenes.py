@@ -34,6 +34,8 @@ from train.shared.console import PlainConsole
 from train.shared.run_folder import user_errors, write_atomically
 
 PICTURE: Final = "scene.png"
+LONG: Final = 32
+"""Letters of a name beyond which not all fit beside each other."""
 LAWS: Final[Mapping[str, str]] = {"Splash": "predictive control"}
 LAW: Final = "adaptive predictive control"
 """Best hand-written law on sensors of these tasks, and of all others."""
@@ -136,7 +138,8 @@ def _label(figure: Figure, panels: Sequence[Axes], scene: Scene) -> None:
         f"{winch.max_rope_acceleration:.1f} m/s²",
         fontsize=10,
     )
-    figure.legend(loc="outside lower center", ncols=4, frameon=False, title="in per cent: share of the ceiling")
+    columns = 4 if max(map(len, scene.runs)) <= LONG else 2
+    figure.legend(loc="outside lower center", ncols=columns, frameon=False, title="in per cent: share of the ceiling")
 
 
 def main() -> int:
