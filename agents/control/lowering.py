@@ -38,7 +38,7 @@ class Retunable(Protocol):
 
     def retune(self, rope_length: FloatArray, growth: FloatArray, wet: FloatArray) -> None:
         """Reckon with ropes of ``rope_length`` (N,) m that bear ``growth`` (N,) N more than at the start, and with
-        loads of which shares ``wet`` (N,) are under water."""
+        loads of which shares ``wet`` (N,) are under water; where the length is NaN, as before."""
         ...
 
 
@@ -210,12 +210,13 @@ class Ways:
     def retune(self, policy: Retunable) -> None:
         """Tune the policy to those ropes and loads that have become other ones as they are planned now.
 
-        The others are tuned to what they have been tuned to: no row depends on another.
+        The others are left alone, to the last bit: a law that is hardly stable makes much of little, and no row is to
+        depend on another.
         """
         changed = np.maximum(abs(self._now / self._tuned[0] - 1.0), abs(self._wet - self._tuned[1])) > RETUNE_AT
         if changed.any():
             self._tuned[:, changed] = self._now[changed], self._wet[changed]
-            length, wet = self._tuned.copy()
+            length, wet = np.where(changed, self._now, np.nan), self._wet
             rope_weight = np.array([scenario.rope_weight for scenario in self._scenarios])
             lighter = self._buoyancy * (wet - self._first_wet)
             policy.retune(length, rope_weight * (length - self._first[0]) - lighter, wet)

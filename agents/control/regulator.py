@@ -123,13 +123,13 @@ class HoistBatch:
 
     def retune(self, rope_length: FloatArray, growth: FloatArray, wet: FloatArray) -> FloatArray:
         """Reckon from now on with ropes of ``rope_length`` (N,) m that bear ``growth`` (N,) N more than at the start,
-        at rest, and with loads of which shares ``wet`` (N,) are under water.
+        at rest, and with loads of which shares ``wet`` (N,) are under water; where the length is NaN as before.
 
         Tensions are read less that growth. Return by what factor the ropes are longer than before, (N,).
         """
-        longer = rope_length / self.rope_length
-        self._tune(rope_length, self._weight + growth, wet, ALL)
-        return np.asarray(longer)
+        before, rows = self.rope_length.copy(), np.flatnonzero(~np.isnan(rope_length))
+        self._tune(rope_length[rows], self._weight[rows] + growth[rows], wet[rows], rows)
+        return np.asarray(self.rope_length / before)
 
     def _tune(self, rope_length: FloatArray, weight: FloatArray, wet: FloatArray, rows: Rows) -> None:
         self.rope_length[rows], self._wet[rows] = rope_length, wet

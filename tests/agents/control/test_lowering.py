@@ -123,6 +123,19 @@ def test_when_a_policy_is_tuned_anew_goes_by_each_lift_alone() -> None:
         np.testing.assert_allclose(together[place], alone[0], rtol=0.0, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    "policy", [Feedback(None), PredictiveControl(PlanningConfig(sensors=None))], ids=lambda p: p.name
+)
+def test_a_lift_that_keeps_its_rope_is_left_alone_when_another_is_tuned(policy: Policy) -> None:
+    still = in_a_sea(replace(HEAVY, target_path=TargetPath.lowering(-5.0, 0.5, start=5.0)))
+    together, alone = (
+        run(Following(policy), scenarios, episode_duration=15.0).drum_speed[0]
+        for scenarios in ([still, in_a_sea(THROUGH)], [still])
+    )
+    # The law hardly holds this load in this sea: another rounding in its gains would soon make millimetres.
+    np.testing.assert_allclose(together, alone, rtol=0.0, atol=1e-9)
+
+
 def test_the_plan_is_the_rope_at_rest() -> None:
     plan = PayOut.weighed(HEAVY, HEAVY.hanging_weight)
     assert plan.weight == pytest.approx(HEAVY.weight, rel=1e-9)
