@@ -265,11 +265,11 @@ def choose_all(texts: Sequence[str]) -> list[PolicySpec]:
     """
     asked = {each: short for text in texts for each, short in _expanded(text).items()}
     specs = [replace(choose(text), text=short) for text, short in asked.items()]
-    for tell in (lambda text: _place(text)[0].name.replace("-", " "), lambda text: text):
+    for told in ([_place(text)[0].name.replace("-", " ") for text in asked], asked.values()):
         names = [spec.name for spec in specs]
         specs = [
-            replace(spec, name=f"{spec.name}, {tell(text)}") if names.count(spec.name) > 1 else spec
-            for text, spec in zip(asked, specs, strict=True)
+            replace(spec, name=f"{spec.name}, {tell}") if names.count(spec.name) > 1 else spec
+            for tell, spec in zip(told, specs, strict=True)
         ]
     return specs
 
@@ -283,8 +283,8 @@ def _expanded(text: str) -> dict[str, str]:
 
 def _place(text: str) -> tuple[Path, str]:
     """Folder that a text stands for, and the word behind its colon, if there is one."""
-    before, colon, word = text.rpartition(":")
-    if not colon or shipped.folder(text).is_dir():
+    before, _, word = text.rpartition(":")
+    if not word or shipped.folder(text).is_dir():
         return shipped.folder(text), ""
     return shipped.folder(before), word
 

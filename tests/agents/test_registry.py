@@ -221,3 +221,14 @@ def test_policies_follow_a_target_that_moves() -> None:
             errors[name, scenario is moving] = run(policy, [scenario], config.replaced(observation=seen)).rms[0]
         # On its way the load is held as it is at one level, up to what the corners leave.
         assert errors[name, True] < 1.2 * errors[name, False] + 0.05
+
+
+@pytest.mark.parametrize("find", [choose, lambda text: choose_all([text])])
+def test_nothing_behind_the_colon_of_an_agent_is_refused(find):
+    with pytest.raises(InvalidValue, match="policy = 'apg-storm:': must be one of"):
+        find("apg-storm:")
+
+
+def test_shipped_agents_of_one_name_are_told_apart_by_what_was_asked_for():
+    names = [spec.name for spec in choose_all(["apg-storm:forecasts", "apg-mru:forecasts"])]
+    assert [name.rpartition(", ")[2] for name in names] == ["apg-storm:forecasts", "apg-mru:forecasts"]
