@@ -129,15 +129,16 @@ class LearningOptions(RunOptions, Where):
                 f"action = {self.action!r}, winch = {self.winch}: must be left out beside --start-from, whose "
                 "agent has an action and inputs of its own"
             )
-        if start.card.sensors != self.config.sensors:
-            raise InvalidValue(
-                f"start_from = {str(self.start_from)!r}: its agent observes {start.card.observation!r}: must be with "
-                f"the very sensors of the training, whose observation = {self.observation!r}"
-            )
         if moves(self.config.nominal):
             raise InvalidValue(
                 f"start_from = {str(self.start_from)!r}: must not be given where target or frame move, for recurrent "
                 "agents do not follow them"
+            )
+        if start.card.sensors != self.config.sensors:
+            raise InvalidValue(
+                f"start_from = {str(self.start_from)!r}: its agent observes {start.card.observation!r}, trained on "
+                f"{start.card.task or 'no task'!r}: must be with the very sensors of the training, whose observation = "
+                f"{self.observation!r} and task = {self.task!r}"
             )
         if abs(start.card.control_period - self.control_period) > 1e-9:
             raise InvalidValue(
@@ -168,7 +169,7 @@ class LearningOptions(RunOptions, Where):
 
     @property
     def adapts(self) -> bool:
-        """Whether the predictive control that is corrected adapts: on a task's sensors, for on each it does better."""
+        """Whether the predictive control that is corrected adapts: on a task's sensors, where it mostly does better."""
         return self.task is not None and self.action == "predictive" and self.observation == "sensors"
 
     @cached_property

@@ -131,10 +131,11 @@ def test_start_from_leads_to_options_of_their_own(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"observation": "state"}, "its agent observes 'sensors': must be with the very sensors"),
+        ({"observation": "state"}, "its agent observes 'sensors', trained on .*: must be with the very sensors"),
         ({"winch": True}, "winch = True: must be left out"),
         ({"control_period": 0.2}, "control_period = 0.2 s: must be 0.1 s"),
-        ({"task": "MRU"}, "must be with the very sensors"),
+        ({"task": "MRU"}, "must be with the very sensors .* task = 'MRU'"),
+        ({"task": "Landing"}, "must not be given where target or frame move"),
     ],
 )
 def test_what_does_not_go_with_the_agent_is_refused(changes, words, tmp_path):
