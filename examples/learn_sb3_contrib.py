@@ -11,13 +11,14 @@ model by its digest. Both are written at the end: an interrupted training leaves
 
 import hashlib
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import torch
 import tyro
-from sb3_contrib import TQC, RecurrentPPO
+from gymnasium.error import DependencyNotInstalled
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
 
@@ -35,6 +36,12 @@ from train.learn.run import ShowReduction, learning_progress
 from train.learn.sb3_env import TrainingVecEnv
 from train.shared.console import PlainConsole
 from train.shared.run_folder import new_folder, user_errors, write_atomically, write_text
+
+with user_errors() if __name__ == "__main__" else nullcontext():
+    try:
+        from sb3_contrib import TQC, RecurrentPPO
+    except ModuleNotFoundError as error:
+        raise DependencyNotInstalled(f'{error.name} is not installed: pip install "aframe-heave[contrib]"') from error
 
 Algorithm = Literal["tqc", "recurrent-ppo"]
 Observation = Literal["state", "sensors"]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import runpy
+import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -11,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import torch
+from gymnasium.error import DependencyNotInstalled
 
 from aframe_env import Scenario, TaskConfig, find_task
 from aframe_env.simulation import Simulation
@@ -133,3 +136,9 @@ def test_an_interrupted_training_leaves_the_folder_as_it_was(tmp_path: Path, mon
         example.learn("tqc", earlier.parent, rows=4, overwrite=True)
     assert list(earlier.parent.iterdir()) == [earlier]
     assert earlier.read_text("utf-8") == "mine"
+
+
+def test_without_the_library_one_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "sb3_contrib", None)
+    with pytest.raises(DependencyNotInstalled, match=r"sb3_contrib is not installed: pip install .*\[contrib\]"):
+        runpy.run_path(str(example.__file__), run_name="imported")
