@@ -53,7 +53,9 @@ class Imported:
             sys.path.remove(here)
         source = getattr(imported, "__file__", None)  # a built-in module has none
         digest = hashlib.sha256(Path(source).read_bytes()).hexdigest() if source else ""
-        if isinstance(found, type) or not _is_policy(found):
+        with _somebodys(f"policy = {text!r}: cannot be looked at"):
+            ready = not isinstance(found, type) and _is_policy(found)
+        if not ready:
             if not callable(found):
                 raise InvalidValue(f"policy = {text!r}: is a {type(found).__name__}, must be a policy or callable")
             needed = _required_arguments(found)
@@ -63,7 +65,8 @@ class Imported:
                 return cls(None, found, needed == 2, digest)
             with _somebodys(f"policy = {text!r}: cannot be made"):
                 found = found()
-            if not _is_policy(found):
+                ready = _is_policy(found)
+            if not ready:
                 kind = type(found).__name__
                 raise InvalidValue(
                     f"policy = {text!r}: made a {kind}, must be a policy with name, knows, reset and act"

@@ -159,6 +159,17 @@ class Unwilling:
         raise RuntimeError("no weights")
 
 
+class Nameless:
+    knows = Knowledge.STATE
+
+    @property
+    def name(self):
+        raise RuntimeError("no name")
+
+
+nameless = Nameless()
+
+
 class Broken:
     name, knows = "broken", Knowledge.STATE
 
@@ -178,6 +189,8 @@ class Broken:
         (f"{__name__}:NoPolicy", "made a NoPolicy, must be a policy with name, knows, reset and act"),
         ("unittest.mock:MagicMock", "made a MagicMock, must be a policy"),
         (f"{__name__}:Unwilling", r"cannot be made: RuntimeError: no weights \(.*test_registry.py, line \d+\)$"),
+        (f"{__name__}:Nameless", r"cannot be made: RuntimeError: no name \(.*test_registry.py, line \d+\)$"),
+        (f"{__name__}:nameless", r"cannot be looked at: RuntimeError: no name \(.*test_registry.py, line \d+\)$"),
         ("sys:exit", "cannot be made: SystemExit"),
     ],
 )
