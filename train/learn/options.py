@@ -10,7 +10,9 @@ from typing import Literal
 from aframe_env.config import TaskConfig
 from aframe_env.suite import find_task
 from aframe_env.validation import InvalidValue, require_choice, require_integer, require_number
+from agents import shipped
 from agents.control.lowering import moves
+from agents.learned.agent import seeds
 from agents.learned.features import Action, FeatureConfig
 from agents.learned.interface import InterfaceConfig, LearnerFeatures
 from agents.learned.recurrent import RecurrentPolicy, load
@@ -40,8 +42,9 @@ class LearningOptions(RunOptions, Where):
     """What the network's output is: "residual" moves the rope's end, above a hand-written feed-forward that follows the
     pulley; "speed" is the drum's speed, with nothing below it; "predictive" corrects what predictive control plans."""
     start_from: Path | None = None
-    """Folder of a recurrent agent to learn on from, as train.apg --updates 0 gives: its memory stays as it is, and its
-    perceptron is the actor, whose output is the share of the winch's acceleration that the drum speeds up with."""
+    """Recurrent agent to learn on from, by name or folder, as train.apg --updates 0 gives one: its memory stays as it
+    is, and its perceptron is the actor, whose output is the share of the winch's acceleration that the drum speeds up
+    with."""
     actor_rate: float = 1.0
     """With ``start_from``: learning rate of the actor, as a share of the critic's. What it knows is soon lost."""
     winch: bool = False
@@ -179,8 +182,11 @@ class LearningOptions(RunOptions, Where):
 
     @cached_property
     def start(self) -> RecurrentPolicy | None:
-        """The recurrent agent to learn on from."""
-        return None if self.start_from is None else load(self.start_from)
+        """The recurrent agent to learn on from, the lowest seed where there are several."""
+        if self.start_from is None:
+            return None
+        folder = shipped.folder(str(self.start_from))
+        return load(next(iter(seeds(folder)), folder))
 
     def learner_features(self, rows: int) -> LearnerFeatures:
         """What so many rows observe."""

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from train.learn.run import train
 from train.learn.trained import to_policy
 from train.shared.run_folder import write_agent
 
+STORM = Path(__file__).parents[3] / "results/agents/apg-storm"
 QUIET = Console(quiet=True)
 FEW = {"n_envs": 3, "practice": 4, "selected_by": 0, "eval_scenarios": 0, "log": (), "timesteps": 96, "horizon": 4.0}
 PPO = {**FEW, "n_steps": 8, "batch_size": 12, "n_epochs": 2, "critic_first": 1}
@@ -119,6 +121,15 @@ def test_the_critics_learn_first(name, tmp_path):
 
     assert learned(24)
     assert not learned(48)
+
+
+def test_an_agent_to_start_from_goes_by_its_name_or_its_folder():
+    by_name, by_folder, by_seed = (
+        ppo_recurrent.Options(task="Storm", start_from=Path(place)).start
+        for place in ("apg-storm", STORM, STORM / "seed-0")
+    )
+    assert by_name.card == by_folder.card == by_seed.card
+    assert by_name.card.algorithm == "recurrent APG"
 
 
 def test_start_from_leads_to_options_of_their_own(tmp_path):
