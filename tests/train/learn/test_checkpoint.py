@@ -71,7 +71,12 @@ def agent(folder: Path) -> bytes:
     return min(folder.glob("*.safetensors")).read_bytes()
 
 
-@pytest.mark.parametrize("case", CASES)
+LONG = ("ppo, predictive, on Landing's sensors",)
+
+
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=pytest.mark.slow) if case in LONG else case for case in CASES]
+)
 def test_a_stopped_training_goes_on_to_the_same_agent(
     case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
