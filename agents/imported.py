@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 import inspect
 import sys
@@ -30,8 +29,8 @@ class Imported:
     function: Callable[..., Any]
     """The function, of observations (N, K) and perhaps of the time, that gives drum speeds (N,) rad/s."""
     takes_time: bool
-    digest: str
-    """sha256 of the module's file; empty for what is built in."""
+    source: Path | None
+    """The module's file; None for what is built in."""
 
     @classmethod
     def of(cls, text: str, module: str, attribute: str) -> Imported:
@@ -51,8 +50,8 @@ class Imported:
                 found = getattr(imported, attribute)
         finally:
             sys.path.remove(here)
-        source = getattr(imported, "__file__", None)  # a built-in module has none
-        digest = hashlib.sha256(Path(source).read_bytes()).hexdigest() if source else ""
+        file = getattr(imported, "__file__", None)
+        source = Path(file) if file else None
         with _somebodys(f"policy = {text!r}: cannot be looked at"):
             ready = not isinstance(found, type) and _is_policy(found)
         if not ready:
@@ -62,7 +61,7 @@ class Imported:
             if needed > 2:
                 raise InvalidValue(f"policy = {text!r}: takes {needed} arguments, must take (observation) or (…, time)")
             if needed > 0 and not isinstance(found, type):
-                return cls(None, found, needed == 2, digest)
+                return cls(None, found, needed == 2, source)
             with _somebodys(f"policy = {text!r}: cannot be made"):
                 found = found()
                 ready = _is_policy(found)
@@ -71,7 +70,7 @@ class Imported:
                 raise InvalidValue(
                     f"policy = {text!r}: made a {kind}, must be a policy with name, knows, reset and act"
                 )
-        return cls(found, found.act, True, digest)
+        return cls(found, found.act, True, source)
 
 
 @dataclass

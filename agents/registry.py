@@ -325,13 +325,13 @@ def _from_folder(folder: Path) -> PolicySpec:
 def _from_module(text: str, module: str, attribute: str) -> PolicySpec:
     """A policy that is imported, or made by what is imported, as ``agents.imported.Imported`` says."""
     imported = Imported.of(text, module, attribute)
-    found = imported.made
+    found, digest = imported.made, _digest(imported.source) if imported.source else ""
     if found is None:
 
         def build(context: BuildContext) -> Policy:
             knows = Knowledge.STATE if context.config.sensors is None else Knowledge.SENSORS
             return FunctionPolicy(text, imported.function, knows, takes_time=imported.takes_time)
 
-        return PolicySpec(text, build, digest=imported.digest)
+        return PolicySpec(text, build, digest=digest)
     policy = FunctionPolicy(found.name, found.act, found.knows, takes_time=True, begin=found.reset)
-    return replace(as_spec(found), build=lambda context: policy, digest=imported.digest)
+    return replace(as_spec(found), build=lambda context: policy, digest=digest)

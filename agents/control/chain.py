@@ -52,7 +52,7 @@ class Hanging(NamedTuple):
     def of(cls, scenario: Scenario) -> Hanging:
         """What truly hangs in a scenario."""
         below, drum_part = scenario.lengths
-        share = share_under_water(scenario, below)
+        share = share_under_water(scenario, scenario.target_level)
         inertia = scenario.load_mass + share * scenario.load.added_mass_vertical
         return cls(scenario.crane.rope, below, drum_part, inertia, drag_of(scenario, below, share), scenario.loss_time)
 

@@ -52,14 +52,14 @@ class Unweighed(NamedTuple):
     """√(μ / E F), time of a wave for each metre of rope, s/m."""
 
 
-def share_under_water(lift: Lift, below: float) -> float:
-    """Share of the load that is under water with ``below`` m of rope below the pulley, ship and water at rest.
+def share_under_water(lift: Lift, level: float) -> float:
+    """Share of the load that is under still water at a level [m].
 
     1 without water, which carries nothing then.
     """
     if lift.water is None:
         return 1.0
-    return lift.load.share_under_water(lift.water.surface_level - lift.crane.pulley_position[2] + below)
+    return lift.load.share_under_water(lift.water.surface_level - level)
 
 
 def unweighed(lift: Lift) -> Unweighed:

@@ -20,7 +20,7 @@ from aframe_env.scenario.sensors import Sensors
 from aframe_env.task import SENSED, STATE
 from aframe_env.validation import InvalidValue
 from agents.control.filters import ALL, Rows
-from agents.control.lift import LEAST_WEIGHT
+from agents.control.lift import LEAST_WEIGHT, share_under_water
 from agents.control.regulator import Observation
 from agents.control.winch import WinchModel
 from agents.policy import FloatArray, Knowledge, Policy
@@ -112,8 +112,7 @@ class PayOut:
 
     def wet(self, level: float) -> float:
         """Share of the load that is under still water at a level [m]."""
-        water = self.scenario.water
-        return 1.0 if water is None else self.scenario.load.share_under_water(water.surface_level - level)
+        return share_under_water(self.scenario, level)
 
     @property
     def buoyancy(self) -> float:

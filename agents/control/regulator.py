@@ -117,7 +117,8 @@ class HoistBatch:
         self._drum_radius[rows] = [lift.crane.drum_radius(x) for lift, x in zip(lifts, lengths, strict=True)]
         self._unweighed[:, rows] = np.array([unweighed(lift) for lift in lifts]).T
         below = (o["rope_length"] - self._unweighed[2, rows]).tolist()
-        wet = [share_under_water(lift, x) for lift, x in zip(lifts, below, strict=True)]
+        levels = [lift.crane.pulley_position[2] - x for lift, x in zip(lifts, below, strict=True)]
+        wet = list(map(share_under_water, lifts, levels))
         self._tune(o["rope_length"], self._weight[rows], np.array(wet), rows)
         return o
 

@@ -22,7 +22,7 @@ from agents.control.lift import Lift
 from agents.control.predictive import Planner, PlanningConfig
 from agents.control.regulator import Observation
 from agents.learned.recurrent import RecurrentCard
-from agents.learned.recurrent_features import BLOCK, padded
+from agents.learned.recurrent_features import Memories
 from agents.learned.recurrent_inputs import FORECASTS, RATES_AHEAD, Lookout, LookoutConfig, Outlook
 from agents.learned.recurrent_network import RecurrentNetwork
 from agents.policy import FloatArray, Knowledge
@@ -43,7 +43,7 @@ class Foretelling:
     def __init__(self, rows: int, network: RecurrentNetwork, made_for: LookoutConfig) -> None:
         self._network = network
         self._lookout = Lookout(rows, made_for)
-        self._memory: list[torch.Tensor | None] = [None] * -(-rows // BLOCK)
+        self._memories = Memories(rows, network)
 
     def start(self, observation: Observation, lifts: Sequence[Lift]) -> FloatArray:
         """Begin with first observations (N, K); return corrections (N, FORECASTS) of the wave bank's forecasts."""
@@ -62,16 +62,9 @@ class Foretelling:
         self._lookout.retune(rope_length, growth, wet)
 
     def _corrections(self, outlook: Outlook) -> FloatArray:
-        series, figures = padded(outlook.series), padded(self._lookout.figures)
-        corrections = []
-        with torch.no_grad():
-            for number in range(len(self._memory)):
-                block = slice(number * BLOCK, (number + 1) * BLOCK)
-                context, self._memory[number] = self._network.remember(
-                    series[block, None], figures[block], self._memory[number]
-                )
-                corrections.append(self._network.forecasts(context[:, 0]) - series[block, :FORECASTS])
-        return np.asarray(torch.cat(corrections)[: len(outlook.series)].double().numpy())
+        context = self._memories.take(outlook, self._lookout.figures)
+        forecasts = self._network.forecasts(torch.from_numpy(context)).numpy()
+        return np.asarray(forecasts - outlook.series[:, :FORECASTS], dtype=np.float64)
 
 
 @cache

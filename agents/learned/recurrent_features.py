@@ -22,36 +22,55 @@ BLOCK: Final = 64
 the others."""
 
 
-def padded(values: npt.NDArray[np.floating]) -> torch.Tensor:
-    """Rows (N, …) as a tensor of whole blocks; what is added repeats the first row."""
-    more = -len(values) % BLOCK
-    return torch.from_numpy(np.concatenate([values, np.repeat(values[:1], more, axis=0)]).astype(np.float32))
-
-
 def in_blocks(values: npt.NDArray[np.floating]) -> tuple[torch.Tensor, ...]:
-    """The blocks of ``padded`` rows (N, …)."""
-    return torch.split(padded(values), BLOCK)
+    """Rows (N, …) in whole blocks; what is added to fill the last repeats the first row."""
+    more = -len(values) % BLOCK
+    filled = np.concatenate([values, np.repeat(values[:1], more, axis=0)])
+    return torch.split(torch.from_numpy(filled.astype(np.float32)), BLOCK)
+
+
+class Memories:
+    """What a network's GRU remembers of N rows, each for itself; it learns nothing here."""
+
+    def __init__(self, rows: int, network: RecurrentNetwork) -> None:
+        self._network = network
+        self._memory = np.zeros((rows, network.memory_size), dtype=np.float32)
+
+    def forget(self, rows: Rows) -> None:
+        """Begin anew in these rows."""
+        self._memory[rows] = 0.0
+
+    def take(self, outlook: Outlook, figures: Float32Array, rows: Rows = ALL) -> Float32Array:
+        """Contexts (n, C) of these rows at their ``outlook``, their lifts' ``figures`` (n, F)."""
+        parts = (outlook.series, figures, self._memory[rows])
+        with torch.no_grad():
+            seen = [
+                self._network.remember(series[:, None], told, memory[None])
+                for series, told, memory in zip(*map(in_blocks, parts), strict=True)
+            ]
+        count = len(outlook.series)
+        self._memory[rows] = torch.cat([last[0] for _, last in seen])[:count].numpy()
+        return torch.cat([each[:, 0] for each, _ in seen])[:count].numpy()
 
 
 class RecurrentFeatures:
     """Inputs of the perceptrons of N rows, whose memories are their own, and what their outputs ask of the winches."""
 
     def __init__(self, rows: int, config: LookoutConfig, network: RecurrentNetwork) -> None:
-        """``network``: its GRU remembers for all rows, and learns nothing here."""
+        """``network``: its GRU remembers for all rows."""
         self.rows = rows
         self.names = tuple(
             f"{kind}_{i}"
             for kind, count in (("context", network.context_size), ("load", LOAD_NUMBERS))
             for i in range(count)
         )
-        self._network = network
         self._lookout = Lookout(rows, config)
-        self._memory = np.zeros((rows, network.memory_size), dtype=np.float32)
+        self._memories = Memories(rows, network)
 
     def start(self, observation: Observation, lifts: Sequence[Lift], rows: Rows = ALL) -> Float32Array:
         """Inputs (n, I) at the first observations (n, K) of these ``rows``, whose past is forgotten."""
         outlook = self._lookout.start(observation, lifts, rows)
-        self._memory[rows] = 0.0
+        self._memories.forget(rows)
         return self._look(outlook, rows)
 
     def advance(self, observation: Observation) -> Float32Array:
@@ -67,15 +86,8 @@ class RecurrentFeatures:
         return self._lookout.command(output)
 
     def _look(self, outlook: Outlook, rows: Rows) -> Float32Array:
-        lookout, count = self._lookout, len(outlook.series)
-        parts = (outlook.series, lookout.figures[rows], self._memory[rows])
-        with torch.no_grad():
-            seen = [
-                self._network.remember(series[:, None], figures, memory[None])
-                for series, figures, memory in zip(*map(in_blocks, parts), strict=True)
-            ]
-        context = torch.cat([each[:, 0] for each, _ in seen])[:count].numpy()
-        self._memory[rows] = torch.cat([last[0] for _, last in seen])[:count].numpy()
+        lookout = self._lookout
+        context = self._memories.take(outlook, lookout.figures[rows], rows)
         load = (
             outlook.z,
             outlook.rise[:, None],

@@ -180,6 +180,11 @@ class LearningOptions(RunOptions, Where):
         """What the agent's features are made for."""
         return FeatureConfig.of(self.config, self.action, winch=self.winch, adapts=self.adapts)
 
+    @property
+    def task_id(self) -> str:
+        """Id of the task of the suite; empty for other scenarios."""
+        return "" if self.task is None else find_task(self.task).id
+
     @cached_property
     def start(self) -> RecurrentPolicy | None:
         """The recurrent agent to learn on from, the lowest seed where there are several."""

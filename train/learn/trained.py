@@ -8,7 +8,6 @@ from typing import Final
 
 from torch import nn
 
-from aframe_env.suite import find_task
 from agents.learned import recurrent
 from agents.learned.agent import CARD, WEIGHTS, AgentCard, LearnedPolicy, card_text, digest, load, serialise
 from agents.learned.feature_sets import feature_names
@@ -60,7 +59,7 @@ def _policy(actor: nn.Module, learner: Learner, options: LearningOptions, timest
         timesteps=timesteps,
         versions=versions(),
         sha256=digest(weights),
-        task="" if options.task is None else find_task(options.task).id,
+        task=options.task_id,
         adapts=options.features.adapts,
         light=options.features.light,
     )
@@ -75,7 +74,7 @@ def _recurrent(
     card = replace(
         begun,
         algorithm=f"recurrent {learner.algorithm} from {begun.algorithm.removeprefix('recurrent ')}",
-        task="" if options.task is None else find_task(options.task).id,
+        task=options.task_id,
         seed=options.seed,
         versions=versions(),
         sha256=digest(weights),
